@@ -16,7 +16,7 @@ from ..data.channels import Labels
 from ..data.decimate import between
 from ..data.left_out import MISSING, SETTLING
 from ..identification.building_sites import StructureRun
-from ..identification.error import ForceError, error_of, errors_by_run
+from ..identification.error import ForceError, error_of, errors_by_run, zero_on
 from ..identification.problem import LOST, Problem, Run, over_noise
 from ..model.model import Model
 from ..physics.drive import DRIVES, VOLTAGE
@@ -307,6 +307,7 @@ def run_predictions(problem: Problem, model: Model) -> list[RunPrediction]:
     """
     out = []
     problem = problem.with_excess(0.0)
+    zero = zero_on(problem, model)
     for run, (bias, sigma, spread), held in zip(
         problem.runs, problem.expectation(model, DRAWS), errors_by_run(problem, model), strict=True
     ):
@@ -316,7 +317,7 @@ def run_predictions(problem: Problem, model: Model) -> list[RunPrediction]:
             sigma = np.where(run.measured, sigma, sigma / LOST)  # `known` says it instead
         out.append(
             RunPrediction(
-                run.name, run.dt, run.force, predicted + bias, sigma, run.noise, spread,
+                run.name, run.dt, run.force, predicted + bias + zero, sigma, run.noise, spread,
                 coordinates_of_run(run), finer - predicted, skip=run.skip, known=run.measured,
                 index=run.keep if isinstance(run, StructureRun) else None,
                 drive=run.drive, labels=run.labels,

@@ -45,7 +45,8 @@ class LawAndEffects:
     @property
     def fitted(self) -> int:
         """How many parameters are fitted."""
-        return len(self.after.model.free()) + self.prepared.problem.free_zero
+        model = self.after.model
+        return len(model.free()) + self.prepared.problem.fits_zero(model)
 
     @property
     def explains(self) -> bool:
@@ -136,17 +137,18 @@ def survivors(rows: Sequence[LawTrial]) -> list[LawTrial]:
     picked = [best, *straight[:1], min(level, key=lambda row: (row.fitted, row.trial.z))]
     if straight and clearly_worse(straight[0].trial, plain[0].trial):
         picked.insert(1, plain[0])
-    front = [
-        row
-        for row in straight
-        if not any(o.fitted <= row.fitted and o.trial.z < row.trial.z for o in straight)
-    ]
+    front = [row for row in straight if not _surpassed(row, straight)]
     usual = list({row.law: row for row in [*picked, *front]}.values())[: BENCH.most_laws]
     # What a law lacks may be why it fits the many samples near rest alone, or why one that contains
     # an effect does no better than one without.
     holding = sorted(filter(_holds, level), key=lambda row: row.fitted)
     hidden = [_formed(ranked[0], rows), *holding[:1]]
     return list({row.law: row for row in [*usual, *hidden]}.values())
+
+
+def _surpassed(row: LawTrial, rows: Sequence[LawTrial]) -> bool:
+    """Return whether a law of no more parameters has a smaller z."""
+    return any(one.fitted <= row.fitted and one.trial.z < row.trial.z for one in rows)
 
 
 def _holds(row: LawTrial) -> bool:
@@ -249,10 +251,14 @@ def _explained(found: Sequence[LawAndEffects]) -> bool:
 
 
 def _best_passed_over(rows: Sequence[LawTrial], looked: Sequence[LawTrial]) -> list[LawTrial]:
-    """Return the law with the smallest z of which no variant and no form was looked at, if any."""
+    """Return the best law of which no variant and no form was looked at, if any.
+
+    That with the smallest z of those that no simpler one surpasses: what a small law lacks may be
+    one effect, what a larger one lacks is more than its own parts.
+    """
     searched = {_base(row) for row in looked}
     left = [row for row in rows if _base(row) not in searched]
-    return sorted(left, key=lambda row: row.trial.z)[:1]
+    return sorted(left, key=lambda row: (_surpassed(row, rows), row.trial.z))[:1]
 
 
 def _waits(row: LawTrial, found: Sequence[LawAndEffects]) -> bool:

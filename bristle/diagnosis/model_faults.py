@@ -18,7 +18,15 @@ from ..core.text import plain, quantity
 from ..data.corrections import LIMITS, limited
 from ..data.left_out import MISSING, merged
 from ..identification.fit import Search, refine
-from ..identification.problem import Expected, Problem, Run, moved_by, residuals, steady
+from ..identification.problem import (
+    Expected,
+    Problem,
+    Run,
+    has_offset,
+    moved_by,
+    residuals,
+    steady,
+)
 from ..identification.search import (
     HUBER_AT_ONE,
     descend,
@@ -123,8 +131,8 @@ def _loss(model: Model, problem: Problem) -> float:
 def _zero_of_force(before: Trial, train: Problem, held_out: Problem) -> ModelBasedFaults | None:
     """Return the offset of the force that fits best, as a preload without stiffness."""
     carrier = _carrier(before.model.base_law)
-    if carrier is None or any(EFFECTS[name].offset for name in before.effects):
-        return None  # an offset of its own would be that one
+    if carrier is None or train.free_zero or has_offset(before.model):
+        return None  # it is known, or an offset of its own would be that one
     base = before.model
     offset = float(np.median(_left(base, train)))
     if promise(_loss(base, _shifted(train, offset)), _loss(base, train)) < DRIVE.promise:

@@ -20,7 +20,7 @@ from ..data.measurement import Measurement
 from ..errors import StudyError
 from ..identification.fit import refine
 from ..identification.prepare import SHORTEST
-from ..identification.problem import Problem, Run
+from ..identification.problem import Problem, Run, zero_of
 from ..identification.rig import Seeds
 from ..model.model import Model
 from ..physics.effect import effects_of
@@ -152,11 +152,12 @@ class Prepared:
     @cached_property
     def freed(self) -> Prepared:
         """The same runs with the zero of the force fitted along with every model."""
-        train, held_out = self.problem.with_free_zero(), self.held_out.with_free_zero()
+        zero = zero_of(self.problem, self.before.model)[0]
+        train, held_out = self.problem.with_free_zero(zero), self.held_out.with_free_zero(zero)
         before = judge(refine(self.before.model, train), train, held_out)
         part = self.part
         if part is not None:
-            part = train if part is self.problem else part.with_free_zero()
+            part = train if part is self.problem else part.with_free_zero(zero)
         return replace(self, before=before, problem=train, held_out=held_out, part=part)
 
     def known(self, model: Model) -> SizeSearch:

@@ -432,27 +432,24 @@ def with_zero_free(prepared: Prepared) -> Prepared:
     return prepared.freed
 
 
-def zero_fault(problem: Problem, decision: Decision) -> Finding | None:
-    """Return the zero of the force beside what was decided with the zero free, None without one."""
-    model = decision.best.model
-    if decision.kind in ("unknown", "insufficient") or has_offset(model):
-        return None
-    if not _significant(problem, model):
-        return None
-    return _fault(*zero_of(problem, model), decision, problem)
+def zero_fault(prepared: Prepared, decision: Decision) -> Finding | None:
+    """Return the zero of the force beside what was decided with the zero free, None without one.
 
-
-def renewed_zero(prepared: Prepared, decision: Decision) -> tuple[Finding, ...]:
-    """Return the zero that was found before any effect as it is beside what was decided.
-
-    Nothing where there was none, or where an effect has a constant force of its own.
+    A zero that was found before any effect is part of it. None where the model has a constant force
+    of its own.
     """
+    problem, model = prepared.problem, decision.best.model
     first = [one for one in prepared.faults if (one.channel, one.kind) == ("force", "bias")]
-    model = decision.best.model
-    if not first or not prepared.problem.free_zero or has_offset(model):
-        return ()
-    more, std = zero_of(prepared.problem, model)
-    return (_fault(first[0].value + more, std, decision, prepared.problem),)
+    if not problem.fits_zero(model) or not (first or _significant(problem, model)):
+        return None
+    more, std = zero_of(problem, model)
+    return _fault(first[0].value + more if first else more, std, decision, problem)
+
+
+def _with_zero(found: SiteDiagnosis, prepared: Prepared, decision: Decision) -> SiteDiagnosis:
+    """Return a diagnosis with the zero of the force beside it, where there is one."""
+    zero = zero_fault(prepared, decision)
+    return replace(found, sensors=(zero,) if zero else ())
 
 
 def _fault(zero: float, std: float, decision: Decision, problem: Problem) -> Finding:
@@ -502,13 +499,14 @@ def diagnose_damper(
     """
     before, rule = prepared.before, prepared.rule
     if noise_is_all(prepared):
-        return of_decision(as_noise(before, ()), before), prepared
+        decision = as_noise(before, ())
+        return _with_zero(of_decision(decision, before), prepared, decision), prepared
     made, decision = _decided(prepared, say, made, pairs)
-    zero, freed = None, free_zero(prepared, decision)
+    freed = free_zero(prepared, decision)
     if freed is not None:
         again, other = _decided(freed, say, made.freed, pairs)
-        zero = zero_fault(freed.problem, other)
-        if zero is not None:
+        decided = other.kind not in ("unknown", "insufficient")
+        if decided and zero_fault(freed, other) is not None:
             prepared, made, decision = freed, again, other
     if excess is None:
         excess = missed_by(made.best, prepared.problem)
@@ -518,15 +516,11 @@ def diagnose_damper(
         prepared = made.prepared
         made, decision = _decided(prepared, say, made, pairs)
     before = prepared.before
-    if zero is not None:
-        sensors = tuple(filter(None, (zero_fault(prepared.problem, decision),)))
-    else:
-        sensors = renewed_zero(prepared, decision)
     if not decision.effects and prepared.held_out.noise_known:
         decision = _rare(before, made.single, rule) or decision
     found = of_decision(decision, before, tuple(made.single))
     best_pair = min(made.pairs, key=lambda pair: pair.z, default=None)
-    found = replace(found, sensors=sensors, together=best_pair)
+    found = _with_zero(replace(found, together=best_pair), prepared, decision)
     patterns = tuple(made.patterns) if rule.organised < 1.0 else ()
     found = replace(found, patterns=patterns, noise_known=prepared.held_out.noise_known)
     return found, prepared

@@ -20,7 +20,7 @@ from ..core.text import percent, quantity
 from ..data.left_out import LOADED, NO_VALUE, SETTLING, WAYS_OUT, any_of
 from ..errors import RecordError
 from ..model.model import Model
-from .problem import Expected, Problem, Run, has_offset, zero_of
+from .problem import Expected, Problem, Run, zero_of
 
 MENTIONED = 0.02
 """Share of samples left out above which the error over all samples is told as well."""
@@ -218,9 +218,7 @@ def zero_on(problem: Problem, model: Model, expected: Expected | None = None) ->
 
     `expected` is what a true model would show on each run, None draws it for this model.
     """
-    if problem.free_zero and not has_offset(model):
-        return zero_of(problem, model, expected)[0]
-    return 0.0
+    return zero_of(problem, model, expected)[0] if problem.fits_zero(model) else 0.0
 
 
 def error_on(run: Run, predicted: Array) -> ForceError:

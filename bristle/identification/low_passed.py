@@ -12,6 +12,7 @@ import numpy as np
 from ..core.arrays import Array
 from ..errors import RecordError
 from ..model.model import Model
+from .error import zero_on
 from .problem import Problem, Run, without
 
 CUTOFF = 18.0
@@ -77,7 +78,8 @@ def filtered_errors(problem: Problem, model: Model, cutoff: float = CUTOFF) -> l
 
     A sample that was not measured has none, neither of its own nor through the low-pass.
     """
-    errors = [_judged(run, run.force - problem.predict(model, run)) for run in problem.runs]
+    zero = zero_on(problem, model)
+    errors = [_judged(run, run.force - problem.predict(model, run) - zero) for run in problem.runs]
     passed = low_passed(errors, [run.dt for run in problem.runs], cutoff)
     return [error[run.skip :] for error, run in zip(passed, problem.runs, strict=True)]
 

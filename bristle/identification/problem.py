@@ -419,6 +419,9 @@ class Problem:
     free_zero = False
     """Whether the force's zero is fitted along with every model; see `zero_of`."""
 
+    zero = 0.0
+    """About what that zero is [N]: states that carry the force at a run's start do without it."""
+
     excess = 0.0
     """Variance [N2] of what no model here explains, beside the noise; see `excess_of`."""
 
@@ -456,7 +459,8 @@ class Problem:
     def of(self, runs: list[Run]) -> Problem:
         """Return a problem of the same kind for other runs, such as a part of these."""
         made = self._made_of(runs)
-        made.free_zero, made.excess, made._benches = self.free_zero, self.excess, self._benches
+        made.free_zero, made.zero = self.free_zero, self.zero
+        made.excess, made._benches = self.excess, self._benches
         return made
 
     def _made_of(self, runs: list[Run]) -> Problem:
@@ -478,10 +482,18 @@ class Problem:
         made._sizes = self._sizes
         return made
 
-    def with_free_zero(self) -> Problem:
-        """Return the same runs with the force's zero fitted along with every model."""
+    def fits_zero(self, model: Model) -> bool:
+        """Return whether the zero of the force is fitted along with a model."""
+        return self.free_zero and not has_offset(model)
+
+    def without_zero(self, force: Array, model: Model) -> Array:
+        """Return a measured force [N] as a model is to carry it, about free of the zero."""
+        return force - self.zero if self.fits_zero(model) else force
+
+    def with_free_zero(self, zero: float = 0.0) -> Problem:
+        """Return the same runs with the force's zero, about `zero` [N], fitted along."""
         made = self.of(self.runs)
-        made.free_zero = True
+        made.free_zero, made.zero = True, zero
         return made
 
     def with_excess(self, excess: float) -> Problem:
@@ -604,17 +616,18 @@ class Problem:
         if (held := _held_starts.get()) is not None and id(run) in held:
             return held[id(run)]
         part, stroke = run.begun, float(np.ptp(run.x))
+        seen = self.without_zero(part.force, model)
 
         def begun(start: Mapping[str, float]) -> Array:
             return self._force(replace(model, values={**model.values, **start}), part)
 
         if run.rest:
-            load = float(np.mean(part.force[run.rest // 2 :]))
+            load = float(np.mean(seen[run.rest // 2 :]))
             return start_under_load(
                 carrying_state(model.base_law, model.effects), load, stroke, begun
             )
         states = remembering_states(model.base_law, model.effects)
-        force = part.force if part.measured is None else np.where(part.measured, part.force, np.nan)
+        force = seen if part.measured is None else np.where(part.measured, seen, np.nan)
         return start_in_motion(states, force, stroke, begun) if states else {}
 
     def _force(self, model: Model, run: Run, draw: int | None = None) -> Array:
@@ -793,11 +806,11 @@ def over_noise(error: Array, sigma: Array) -> Array:
 def errors(problem: Problem, model: Model, expected: Expected) -> list[Array]:
     """Return per run the error (n - skip,) [N]: measured less predicted, less the expected bias.
 
-    Where the force's zero is fitted along, less that zero as well; a model with an effect that has
-    a constant force of its own has none besides.
+    Where the force's zero is fitted along, less that zero as well; a model that has a constant
+    force of its own has none besides.
     """
     found = _with_zero(problem, model, expected)
-    if not problem.free_zero or has_offset(model):
+    if not problem.fits_zero(model):
         return found
     zero = _constant(problem, found, expected)
     return [error - zero for error in found]
@@ -818,11 +831,11 @@ def noise_of(problem: Problem, expected: Expected) -> Array:
 
 
 def has_offset(model: Model) -> bool:
-    """Return whether an effect of a model has a constant force of its own that a fit moves."""
-    return any(
-        EFFECTS[name].offset and f"{name}.{EFFECTS[name].offset}" not in model.fixed
-        for name in model.effects
-    )
+    """Return whether a model's law or an effect has a constant force that a fit moves."""
+    own = model.law_class.offset
+    effects = [(name, EFFECTS[name].offset) for name in model.effects]
+    constants = [own] * bool(own) + [f"{name}.{offset}" for name, offset in effects if offset]
+    return any(name not in model.fixed for name in constants)
 
 
 def zero_of(

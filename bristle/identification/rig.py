@@ -13,6 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core.text import quantity
+from ..data.checks.channels import zero_of_load_cell
 from ..data.measurement import Measurement
 from ..errors import StudyError
 from ..model.model import Model
@@ -108,6 +110,12 @@ DAMPER = "damper"
 _NOT_TOLD = (
     "Springs and damping of the storeys beside it are those of the building's file: equilibrium "
     "does not tell them from the damper's own."
+)
+
+_ZERO = (
+    "All training runs alike show some {} however they move: the zero of the load cell, or a "
+    "preload on the rod. Beside a law without a constant force it is fitted along, left out of the "
+    "errors, and not in the FMU."
 )
 
 _STILL = (
@@ -271,6 +279,7 @@ def bench_rig(
     seeds : of the draws of the motion's error
     """
     seeds = seeds or Seeds()
+    zero = zero_of_load_cell(train)
     runs = {ROLES[0]: (train, seeds.train), ROLES[1]: (holdout, seeds.holdout)}
 
     def problem(role: str) -> Problem | None:
@@ -282,10 +291,12 @@ def bench_rig(
         if not measured:
             return None
         # The first by itself: it compiles what the others need, or reads it from disk.
-        return Problem([prepared(0), *in_threads(prepared, range(1, len(measured)))])
+        found = Problem([prepared(0), *in_threads(prepared, range(1, len(measured)))])
+        return found if zero is None else found.with_free_zero(zero)
 
     site = Site(DAMPER, problem)
-    return Rig(lambda _model: {DAMPER: site})
+    notes = () if zero is None else (_ZERO.format(quantity(zero, "N")),)
+    return Rig(lambda _model: {DAMPER: site}, notes=notes)
 
 
 def building_rig(

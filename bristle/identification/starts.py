@@ -84,6 +84,9 @@ class _Net:
         weight = self._weight()
         C = np.array(columns) * weight
         f = np.concatenate([run.force for run in problem.runs]) * weight
+        if problem.fits_zero(self.model_0):
+            constant = weight / np.linalg.norm(weight)
+            C, f = C - np.outer(C @ constant, constant), f - (f @ constant) * constant
         self.gram, self.right, self.square = C @ C.T, C @ f, float(f @ f)
 
     def _nodes(self, name: str, shape: Shape) -> Array:

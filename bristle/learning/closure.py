@@ -28,8 +28,9 @@ from ..data.corrections import jumps
 from ..data.run_labels import labels_of
 from ..diagnosis.prepared import Prepared
 from ..diagnosis.trials import Trial, guesses_of, joinable, judge, short_search
+from ..identification.error import zero_on
 from ..identification.fit import refine
-from ..identification.problem import Problem, Run, has_offset, sensors, zero_of
+from ..identification.problem import Problem, Run, sensors
 from ..identification.search import in_threads
 from ..identification.start_grid import SearchContext
 from ..model.model import Model
@@ -292,7 +293,7 @@ def reversals(run: Run) -> int:
 
 def errors_of(model: Model, problem: Problem) -> list[Array]:
     """Return per run the error of a model's force at the samples that count [N]."""
-    zero = zero_of(problem, model)[0] if problem.free_zero and not has_offset(model) else 0.0
+    zero = zero_on(problem, model)
     return [(run.force - problem.predict(model, run) - zero)[_counts(run)] for run in problem.runs]
 
 
@@ -385,7 +386,7 @@ def _tried(train: Problem, model: Model, decays: Sequence[float]) -> tuple[list[
     train, model : the training runs, and the model that networks are beside
     decays : penalties of those that are trained
     """
-    zero = zero_of(train, model)[0] if train.free_zero and not has_offset(model) else 0.0
+    zero = zero_on(train, model)
     total = sum(int(np.count_nonzero(_counts(run))) for run in train.runs)
     rows = [np.flatnonzero(_counts(run))[:: max(1, total // MOST)] for run in train.runs]
     y = [

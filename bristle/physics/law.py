@@ -89,7 +89,7 @@ def _variant(one: Any) -> bool:
 
 
 FIELDS = {
-    **dict.fromkeys(("name", "site", "place", "stiffness", "source", "felt"), TEXT),
+    **dict.fromkeys(("name", "site", "place", "stiffness", "source", "felt", "offset"), TEXT),
     **dict.fromkeys(("parts", "contains", "assumed"), TEXTS),
     **dict.fromkeys(("states", "starts"), TEXT_BY_NAME),
     "parameters": PARAMETERS,
@@ -139,6 +139,8 @@ def _check_names(law: type[Law], where: str) -> None:
             )
         if quantity in places and quantity not in form.names():
             raise PhysicsError(f"{where}: {quantity} is a quantity and a parameter.")
+    if law.offset and (law.offset not in places or law.parameters[law.offset].unit != "N"):
+        raise PhysicsError(f"{where}: offset = {law.offset!r}; a parameter in N is right.")
     if law.felt and law.states.get(law.felt) != "V":
         raise PhysicsError(f"{where}: felt = {law.felt!r}; the name of a state in V is right.")
     wrong = [n for n, signal in law.starts.items() if n not in law.states or signal not in SIGNALS]
@@ -243,6 +245,8 @@ class Law:
         linear, but `parameter.CHOICES` and what is `assumed`.
     assumed
         Parameters that measurements hardly tell: no fit moves them.
+    offset
+        The parameter [N] that is a constant force: the load cell's zero is not fitted beside it.
     variants
         `{suffix: Variant}`.
     place, stiffness
@@ -305,6 +309,7 @@ class Law:
     shapes: ClassVar[dict[str, Shape]] = {}
     starts: ClassVar[dict[str, str]] = {}
     felt: ClassVar[str] = ""
+    offset: ClassVar[str] = ""
     assumed: ClassVar[tuple[str, ...]] = ()
     variants: ClassVar[dict[str, Variant]] = {}
     place: ClassVar[str] = ""

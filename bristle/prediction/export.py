@@ -332,7 +332,8 @@ class Proof:
     that the FMU was run on, `fmu` its own over that part, `raw` its own when it is fed with the
     measured columns as they are, None where they are not there; `step` [s] that of the FMU, `part`
     the share of the samples that it was run on; `training` whether these are the training runs,
-    for there are no others; `why` says why the FMU was not run, "" where it was.
+    for there are no others; `why` says why the FMU was not run, "" where it was; `zero` [N] is what
+    the load cell shows more, added to the FMU's force.
     """
 
     told: ForceError
@@ -343,6 +344,7 @@ class Proof:
     part: float = 1.0
     training: bool = False
     why: str = ""
+    zero: float = 0.0
 
     @property
     def agrees(self) -> bool:
@@ -359,6 +361,11 @@ class Proof:
             f"Force error on the {runs}, as bristle compare prints it: {self.told.text()}.",
             *self.told.beside(),
         ]
+        if self.zero:
+            out.append(
+                f"The load cell shows {quantity(self.zero, 'N')} more than the FMU, its zero or a "
+                "preload: that is added before the comparison."
+            )
         if self.fmu is None:
             return [*out, f"The FMU was not run to confirm it: {self.why}"]
         over = "" if self.part == 1.0 else f", the first {100.0 * self.part:.2g} % of each run"
@@ -582,13 +589,14 @@ def _proof(held: HeldOut, fmu: Path, step: float, samples: Sequence[int]) -> Pro
     try:
         errors = in_threads(run_fmu, jobs)
     except FmuError as error:  # such as a library for another platform
-        return Proof(told, step, training=held.training, why=str(error))
+        return Proof(told, step, training=held.training, why=str(error), zero=held.zero)
     own, raw = errors[: len(held.runs)], errors[len(held.runs) :]
     lengths = [len(run.force) for run in held.runs]
     part = 1.0 if [*samples] == lengths else sum(samples) / sum(lengths)
     return Proof(
         told, step, held.error(held.fed, samples=samples) if part < 1.0 else told, pooled(own),
         pooled(raw) if raw else None, part, held.training,
+        zero=held.zero,
     )  # fmt: skip
 
 

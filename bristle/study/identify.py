@@ -275,7 +275,7 @@ def under_load(at: SiteModel) -> list[str]:
     """Return the sentence that tells which runs begin under a load that the model carries."""
     problems = (at.site.train, at.site.holdout)
     loads = {
-        run.name: float(np.mean(run.force[: run.rest]))
+        run.name: float(np.mean(problem.without_zero(run.force[: run.rest], at.model)))
         for problem in problems
         if problem is not None
         for run in problem.runs

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ..channels import DRIVE, device_channel
 from ..cut_off import clipped_ends
 from ..measurement import Measurement
 from ..noise import Noise, estimate_noise, is_switched, spikes_text
+from .motion import velocity_of_run
 
 _MOTIONLESS = "Check the cable and the column: is it the right one?"
 _HELD = 2  # samples per value from which a channel is one that was logged more slowly
@@ -230,6 +231,36 @@ def middle_drift(x: Array, velocity: Array) -> tuple[float, float]:
     slope = float(at @ middles / (at @ at))
     left = middles - middles.mean() - slope * at
     return slope, float(np.std(left) / np.sqrt(at @ at))
+
+
+LEAST_ZERO = 0.03
+"""Share of the force's RMS from which a constant part of it counts."""
+
+SAME_ZERO = 0.15
+"""Share of it by which a constant part may differ between runs and be that of the load cell."""
+
+
+def zero_of_load_cell(runs: Sequence[Measurement]) -> float | None:
+    """Return the constant force [N] that runs show alike however they move, None without one.
+
+    It is the load cell's zero, or a preload; that of an asymmetric damper differs between runs.
+    """
+    found = []
+    for run in runs:
+        velocity = velocity_of_run(run)
+        if velocity is None or "force" not in run.channels:
+            return None
+        counts = np.isfinite(run["force"]) & np.isfinite(velocity)
+        drive = next((run[one][counts] for one in DRIVE if one in run.channels), None)
+        found.append(force_offset(run["force"][counts], velocity[counts], drive))
+    if len(found) < 2:
+        return None
+    offsets, spreads = np.array(found).T
+    zero = float(np.median(offsets))
+    rms = float(np.sqrt(np.mean([np.nanvar(run["force"]) for run in runs])))
+    alike = np.abs(offsets - zero) <= np.maximum(SAME_ZERO * abs(zero), 4.0 * spreads)
+    sure = abs(zero) > max(LEAST_ZERO * rms, 4.0 * float(np.median(spreads)))
+    return zero if sure and bool(alike.all()) else None
 
 
 def force_offset(force: Array, velocity: Array, drive: Array | None = None) -> tuple[float, float]:

@@ -54,6 +54,7 @@ class BoucWen(Law):
     name = "bouc_wen"
     parts = ("yield", "bristle", "viscous", "spring")
     contains = ("spring",)
+    offset = "f_0"
     source = (
         "Spencer, Dyke, Sain & Carlson (1997), J. Eng. Mech. 123(3), 230-238, eqs. 3, 4; normal "
         "form: Ikhouane, Manosa & Rodellar (2007), Syst. Control Lett. 56(6), 455-461"

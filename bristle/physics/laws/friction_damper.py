@@ -75,6 +75,7 @@ class FrictionDamper(Law):
     name = "friction_damper"
     parts = ("yield", "bristle", "viscous", "spring")
     contains = ("spring", "series element")
+    offset = "f_0"
     source = (
         "Pall & Marsh (1982), J. Struct. Div. 108(6), 1313-1323; Dahl (1968), A Solid Friction "
         "Model, Aerospace Corp. TOR-0158(3107-18)-1; play: Nordin & Gutman (2002), Automatica "

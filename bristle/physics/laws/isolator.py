@@ -21,6 +21,7 @@ class Isolator(Law):
     name = "isolator"
     parts = ("yield", "bristle", "viscous", "spring")
     contains = ("spring", "duffing")
+    offset = "f_0"
     source = (
         "Robinson (1982), Earthq. Eng. Struct. Dyn. 10(4), 593-604; hysteresis: Wen (1976), "
         "J. Eng. Mech. Div. 102(2), 249-263; hardening: Kikuchi & Aiken (1997), Earthq. Eng. "

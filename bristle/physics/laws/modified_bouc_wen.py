@@ -98,6 +98,7 @@ class ModifiedBoucWen(Law):
     # No "series element": a dashpot never springs back, so that mounts and gaps join. No "lag"
     # either: coils, supplies and fluids may each follow late, and this law has one of them.
     contains = ("spring",)
+    offset = "f_0"
     source = "Spencer, Dyke, Sain & Carlson (1997), J. Eng. Mech. 123(3), 230-238, eqs. 5 to 10"
     states = {"deflection": "m", "inner": "m", "command": "V"}
     starts = {"command": "V"}

@@ -79,6 +79,7 @@ class ShockAbsorber(Law):
     name = "shock_absorber"
     parts = ("yield", "bristle", "viscous", "spring")
     contains = ("spring", "series element", "asymmetry", "quadratic_damping")
+    offset = "f_0"
     source = (
         "Besinger, Cebon & Cole (1995), Veh. Syst. Dyn. 24(1), 35-64; Duym (2000), Veh. Syst. Dyn. "
         "33(4), 261-285"

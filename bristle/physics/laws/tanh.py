@@ -24,6 +24,7 @@ class Tanh(Law):
     name = "tanh"
     parts = ("yield", "viscous", "spring")
     contains = ("spring",)
+    offset = "f_0"
     source = "Kwok, Ha, Nguyen, Li & Samali (2006), Sens. Actuators A 132(2), 441-451"
     parameters = {
         "f_c": Parameter(1.3, "N", (0.0, 1e5), "yield force without voltage"),
