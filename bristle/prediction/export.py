@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..core.arrays import Array
 from ..core.files import write_whole, writing
 from ..core.text import command, quantity
+from ..data.checks.channels import zero_of_load_cell
 from ..data.measurement import Measurement
 from ..errors import FmuError, RecordError, StudyError
 from ..fmu.build import BuildPlan, build, plan
@@ -31,6 +32,7 @@ from ..identification.problem import (
     Problem,
     Run,
     following,
+    has_offset,
     of_one_site,
     sensors,
     shown_force,
@@ -126,7 +128,7 @@ def export_study(study: Study, out: Path | None = None, build: Build = build) ->
             return {"fmu": str(fmu.absolute()), "parameters": parameters}
 
         drive = drive_named(measurement.drive)
-        scenario, files = _scenario(study, model, measurement, drive, folder, damper, notes)
+        scenario, files = _scenario(study, model, runs, measurement, drive, folder, damper, notes)
         proof = None
         if held and step:
             files += write_inputs(held, step, folder / FOLDER)
@@ -182,18 +184,19 @@ def write_editable(study: Study, folder: Path) -> Editable:
 
     with writing(folder, StudyError):
         folder.mkdir(parents=True, exist_ok=True)
-        scenario, _ = _scenario(study, model, measurement, VOLTAGE, folder, damper, notes)
+        scenario, _ = _scenario(study, model, runs, measurement, VOLTAGE, folder, damper, notes)
     numbers = tuple(name for name in values if name in own.values)
     return Editable(scenario, measurement.name, numbers, measurement.has("force"), tuple(notes))
 
 
 def _scenario(
-    study: Study, model: Model, measurement: Measurement, drive: Drive, folder: Path,
+    study: Study, model: Model, runs: Runs, measurement: Measurement, drive: Drive, folder: Path,
     damper: DamperTable, notes: list[str],
 ) -> tuple[Path, list[Path]]:  # fmt: skip
     """Write the scenario of a study's damper, on the bench or in its building, and its files."""
     if not study.settings.has_building:
-        system, about = bench_system(study.name, model, measurement, drive, damper)
+        zero = 0.0 if has_offset(model) else zero_of_load_cell(runs.train) or 0.0
+        system, about = bench_system(study.name, model, measurement, drive, damper, zero)
         scenario, *files = save(system, folder / "bench.toml", about)
         return scenario, files
     shaking = replace(shaking_of(measurement), drive=drive)
@@ -577,7 +580,7 @@ def _proof(held: HeldOut, fmu: Path, step: float, samples: Sequence[int]) -> Pro
         end = (samples[k] - 1) * _steps_per_sample(run, fed, longest) + 1
         dense = _dense_inputs(held.damper, run, fed, longest)
         inputs = {name: _begin(y[:end]) for name, (_, y) in dense.items()}
-        values = start_values(held.damper, held.fed[k], run)
+        values = start_values(held.damper, held.fed[k], run, held.problem)
         n = _steps_per_moment(fed, longest)
         whole = (fed.moments.dt / n,)
         stepping = SteppingJob(str(fmu.resolve()), values, tuple(inputs), ("force",), whole)
@@ -626,7 +629,7 @@ def write_proof(proof: Proof, held: HeldOut, fmu: Path, folder: Path) -> list[Pa
         },
         "filter": {run.name: run.finer.taps.tolist() if run.finer else [1.0] for run in held.runs},
         "start_values": {
-            run.name: start_values(held.damper, fed, run)
+            run.name: start_values(held.damper, fed, run, held.problem)
             for run, fed in zip(held.runs, held.fed, strict=True)
         },
     }  # fmt: skip

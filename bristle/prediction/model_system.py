@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.arrays import Array
+from ..core.text import quantity
 from ..data.channels import device_channel
 from ..data.measurement import Measurement
 from ..errors import StudyError
@@ -275,8 +276,9 @@ AGREEMENT = 0.01
 
 
 def bench_system(
-    title: str, model: Model, measurement: Measurement, drive: Drive, damper: DamperTable
-) -> tuple[System, str]:
+    title: str, model: Model, measurement: Measurement, drive: Drive, damper: DamperTable,
+    zero: float,
+) -> tuple[System, str]:  # fmt: skip
     """Return a damper that is moved as in a measured run, as a system, and what is to know of it.
 
     Parameters
@@ -286,16 +288,18 @@ def bench_system(
     measurement : the run
     drive : what the damper's command is called
     damper : parameters to the table of the component that is called damper
+    zero : what the load cell shows more [N]
     """
     run = prepare(measurement)
-    fed = Problem([run]).fed(model, run)
+    problem = Problem([run]).with_free_zero(zero)
+    fed = problem.fed(model, run)
     v, a = true_motion(model.effects, model.values, run.v, run.a, run.dt)
     run = replace(run, v=v, a=a)
     fine = max(1, ceil(run.dt / BENCH_STEP - 1e-9))
     step = float(f"{run.dt / fine:.12g}")
     stop = float(f"{(len(run.x) - 1) * fine * step:.12g}")
     time = run.dt * np.arange(len(run.x))
-    rows = {"measured": ("force", "N", run.force)}
+    rows = {"measured": ("force", "N", run.force - zero)}
     wires: dict[str, Any] = {
         "damper.displacement": "rod.displacement", "damper.velocity": "rod.velocity",
     }  # fmt: skip
@@ -313,9 +317,9 @@ def bench_system(
     parts = {"rod": _source(_motion(run, fine), "PrescribedMotion")}
     # A signal is 0 after its file, and the last step may end a rounding error later.
     time, last = np.append(time, time[-1] + run.dt), slice(-1, None)
-    for name, (quantity, unit, values) in rows.items():
-        parts[name] = _source(signal_of(time, np.append(values, values[last]), quantity, unit))
-    starts = start_values(own, fed, run)
+    for name, (what, unit, values) in rows.items():
+        parts[name] = _source(signal_of(time, np.append(values, values[last]), what, unit))
+    starts = start_values(own, fed, run, problem)
     if not measurement.drive:
         starts[drive.name] = 0.0
     title = f"{title}: the model on the bench, motion of {measurement.name}"
@@ -324,6 +328,8 @@ def bench_system(
         f"# damper.force is the model's, measured.value the measured one [N]. Sampled at "
         f"{run.dt:g} s; the step is finer\n# because an FMU holds its inputs over a step."
     )
+    if zero:
+        about += f"\n# measured.value is less {quantity(zero, 'N')}, the zero of the load cell."
     return make_system(title, settings, {**parts, "damper": damper(starts)}, wires), about
 
 
@@ -342,7 +348,7 @@ def _motion(run: Run, fine: int) -> Signal:
     return signal_of(nodes, x, "displacement", "m", "motion")
 
 
-def start_values(damper: Model, fed: Fed, run: Run) -> dict[str, float]:
+def start_values(damper: Model, fed: Fed, run: Run, problem: Problem) -> dict[str, float]:
     """Return the parameters that a run sets: states that begin with a signal, labels, its load."""
     drive = drive_named(run.drive)
     moments = fed.moments
@@ -353,7 +359,7 @@ def start_values(damper: Model, fed: Fed, run: Run) -> dict[str, float]:
         starts = EFFECTS[name].starts
         states |= {f"{name}.{called[state]}": signal for state, signal in starts.items()}
     begun = {f"{name}_0": first[signal] for name, signal in states.items() if signal in first}
-    begun |= Problem([run]).carrying(damper, run)
+    begun |= problem.carrying(damper, run)
     return begun | values_of_labels(damper.effects, run.labels)
 
 

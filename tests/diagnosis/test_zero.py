@@ -170,3 +170,20 @@ def test_a_constant_part_that_differs_between_runs_is_no_zero():
 def test_a_law_with_a_constant_force_of_its_own_keeps_it():
     found = bristle.identify(runs_of((2.0, 2.0, 2.0)), "bouc_wen")
     assert found.model.value("f_0") == pytest.approx(2.0, abs=0.02)
+
+
+def test_a_spring_in_series_is_not_loaded_by_the_zero_where_a_run_begins_at_rest():
+    """A Maxwell element at rest, then a sine: in closed form, its load cell 30 N off."""
+    rng, t, found, k, tau = np.random.default_rng(4), np.arange(0.0, 4.0, 0.004), [], 1e4, 0.02
+    for size, f in ((0.01, 1.0), (0.02, 1.5), (0.01, 2.0)):
+        w, s = 2.0 * np.pi * f, np.maximum(t - 0.4, 0.0)
+        moves = (s > 0.0) * size
+        lag = 1.0 / (1.0 + (w * tau) ** 2)
+        force = k * w * tau * lag * (np.cos(w * s) + w * tau * np.sin(w * s) - np.exp(-s / tau))
+        found.append({
+            "time": t, "displacement": moves * np.sin(w * s) + rng.normal(0.0, 1e-6, t.size),
+            "force": moves * force + 30.0 + rng.normal(0.0, 0.2, t.size),
+        })  # fmt: skip
+    fitted = bristle.identify(found, "fluid_viscous")
+    assert fitted.model.value("alpha") == pytest.approx(1.0, abs=0.02)
+    assert fitted.error.rms == pytest.approx(0.2, rel=0.25)

@@ -251,6 +251,8 @@ def zero_of_load_cell(runs: Sequence[Measurement]) -> float | None:
         if velocity is None or "force" not in run.channels:
             return None
         counts = np.isfinite(run["force"]) & np.isfinite(velocity)
+        if not np.any(velocity[counts]):
+            return None
         drive = next((run[one][counts] for one in DRIVE if one in run.channels), None)
         found.append(force_offset(run["force"][counts], velocity[counts], drive))
     if len(found) < 2:
