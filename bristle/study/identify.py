@@ -246,17 +246,7 @@ def doubts(runs: list[Measurement]) -> list[str]:
             notes.append(
                 f"{run.name}: {percent(share)} of the force's samples are at its extremes."
             )
-    driven = [
-        run.name
-        for run in runs
-        if (velocity := velocity_of_run(run)) is not None
-        and any(one.level == "error" for one in check_force(run, velocity))
-    ]
-    if driven:
-        notes.append(
-            f"The force drives the motion in {listed(driven)}, as no damper does: its sign is "
-            "wrong there. bristle study check shows how it is read right."
-        )
+    notes += driven(runs)
     doubtful: dict[str, int] = {}
     for run in runs:
         for channel, fact in run.noise_facts.items():
@@ -269,6 +259,21 @@ def doubts(runs: list[Measurement]) -> list[str]:
             "intervals depend on it."
         )
     return notes
+
+
+def driven(runs: Sequence[Measurement]) -> list[str]:
+    """Return the sentence that names runs whose force drives the motion, [] where none does."""
+    names = [
+        run.name
+        for run in runs
+        if (velocity := velocity_of_run(run)) is not None
+        and any(one.level == "error" for one in check_force(run, velocity))
+    ]
+    said = (
+        f"The force drives the motion in {listed(names)}, as no damper does: its sign is wrong "
+        "there. bristle study check shows how it is read right."
+    )
+    return [said] if names else []
 
 
 def under_load(at: SiteModel) -> list[str]:

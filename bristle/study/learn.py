@@ -36,7 +36,7 @@ from ..model.model import Model
 from ..physics.effect import EFFECTS
 from ..trust import remember_made
 from ..user_code.load import flaw_of
-from .identify import is_identified
+from .identify import driven, is_identified
 from .rig import building_of
 from .study import Study
 
@@ -221,6 +221,9 @@ def opened_at(
     if fitted is not None:
         fitted = replace(fitted, law=fitted.base_law)  # its variant is among the values
         return DAMPER, rig.prepare(DAMPER, judge(fitted, *rig.damper))
+    runs = study.runs()
+    if wrong := driven([*runs.train, *runs.holdout]):
+        raise StudyError(f"{nothing} {wrong[0]}")
     prepared = {site: rig.prepare(site) for site in ([at] if at else _wanted(study, there))}
     able = [pair for pair in prepared.items() if pair[1].held_out.noise_known or not noise]
     if not able:

@@ -123,6 +123,12 @@ def test_a_force_that_drives_the_motion_is_told_where_a_model_is_fitted(
     assert main(["identify", str(rig), "--starts", "1"]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "The force drives the motion in run_1, as no damper does: its sign is wrong" in said
+    for more in ([], ["--closure"]):
+        assert main(["learn", str(rig), *more]) == 2
+        said = " ".join(capsys.readouterr().err.split())
+        assert (
+            "nothing can be learned from these runs. The force drives the motion in run_1" in said
+        )
 
 
 BURST = """from math import exp
