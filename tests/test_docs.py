@@ -8,6 +8,7 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 
@@ -37,6 +38,7 @@ def load(name: str) -> ModuleType:
     return module
 
 
+DRAWN = "gas_spring"
 snippets = load("snippets")
 generate = load("generate")
 PAGES = {str(page.relative_to(ROOT)): page for page in snippets.all_pages()}
@@ -122,8 +124,21 @@ def test_the_site_renders_without_a_warning(tmp_path: Path) -> None:
         assert (page / "index.html").is_file()
 
 
-def test_every_component_has_a_page_with_all_its_ports_and_parameters() -> None:
-    pages = generate.pages()
+@pytest.fixture(scope="module")
+def pages() -> Iterator[dict[str, str]]:
+    """Return the generated pages; of the effects' pictures, all drawn alike, only one is drawn."""
+    effect_pages = sys.modules["effect_pages"]
+    draw = effect_pages.picture_of
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            effect_pages, "picture_of", lambda name: draw(name) if name == DRAWN else None
+        )
+        yield generate.pages()
+
+
+def test_every_component_has_a_page_with_all_its_ports_and_parameters(
+    pages: dict[str, str],
+) -> None:
     for name in catalogue.component_names():
         text = pages[f"components/{name}.md"]
         for variable in catalogue.describe(name).variables.values():
@@ -132,8 +147,7 @@ def test_every_component_has_a_page_with_all_its_ports_and_parameters() -> None:
                 assert variable.unit is None or f"`{variable.unit}`" in text
 
 
-def test_every_effect_has_a_page_with_text_parameters_and_source() -> None:
-    pages = generate.pages()
+def test_every_effect_has_a_page_with_text_parameters_and_source(pages: dict[str, str]) -> None:
     for name, effect in EFFECTS.items():
         text = pages[f"effects/{name}.md"]
         assert effect.first_line() in text
@@ -148,10 +162,12 @@ def test_every_effect_has_a_page_with_text_parameters_and_source() -> None:
         assert all(one in text for one in set_)
         for parameter, about in effect.parameters.items():
             assert f"| `{name}.{parameter}` | {about.value:g} |" in text
+    assert f"![Force with and without {DRAWN}]({DRAWN}.png)" in pages[f"effects/{DRAWN}.md"]
+    assert sys.modules["effect_pages"].picture_of(DRAWN)[0].startswith(b"\x89PNG")
 
 
-def test_every_command_has_a_section_with_all_its_options() -> None:
-    text = generate.pages()["cli.md"]
+def test_every_command_has_a_section_with_all_its_options(pages: dict[str, str]) -> None:
+    text = pages["cli.md"]
     commands = next(a for a in build_parser()._actions if a.dest == "command").choices
     assert commands is not None
     for name, parser in commands.items():
@@ -164,8 +180,7 @@ def test_every_command_has_a_section_with_all_its_options() -> None:
                 assert option in section or f"`{option}`" in text[:400], f"{name} {option}"
 
 
-def test_every_law_has_a_page_with_its_parameters_and_source() -> None:
-    pages = generate.pages()
+def test_every_law_has_a_page_with_its_parameters_and_source(pages: dict[str, str]) -> None:
     for law in laws_of("damper"):
         text = pages[f"laws/{law.name}.md"]
         assert law.source in text
@@ -192,8 +207,8 @@ def test_the_first_pages_begin_with_the_picture_and_the_commands_that_make_it() 
     assert (DOCS / "figures" / "hidden_effect.png").is_file()
 
 
-def test_tables_of_generated_pages_are_whole() -> None:
-    for path, text in generate.pages().items():
+def test_tables_of_generated_pages_are_whole(pages: dict[str, str]) -> None:
+    for path, text in pages.items():
         for block in re.findall(r"(?:^\|.*\|$\n?)+", text, re.MULTILINE):
             widths = {len(re.findall(r"(?<!\\)\|", line)) for line in block.splitlines()}
             assert len(widths) == 1, f"{path}: {block}"

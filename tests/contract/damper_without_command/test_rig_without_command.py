@@ -13,7 +13,7 @@ from bristle.cli import main
 from bristle.study.study import Study
 
 WORDS = re.compile(r"\b(volt|voltage|volts|coil|drive|driven|command|commanded)\b|N/V|\(m\.V\)")
-T = np.arange(3000) / 500.0
+T = np.arange(1500) / 500.0
 
 
 def orifice(k: int) -> tuple[np.ndarray, np.ndarray]:

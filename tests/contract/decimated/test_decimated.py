@@ -14,7 +14,7 @@ from bristle.cli import main
 from bristle.identification.prepare import prepare
 from bristle.study.run_facts import RunChoices
 
-SECONDS = 6.0
+SECONDS = 3.0
 
 
 def record(path: Path, rate: float, seed: int, noise: float = 0.0, corner: float = 0.0) -> Path:

@@ -48,7 +48,7 @@ def checked(rig: Path) -> tuple[float, float]:
 @pytest.mark.parametrize(
     ("rates", "law", "switched"),
     [
-        ((500.0, 200.0, *[500.0] * 4), "bingham", False),
+        ((500.0, 200.0, 500.0, 500.0), "bingham", False),
         # 4 s each: a law with a state, and the FMU stepped at 3 kHz.
         pytest.param((500.0,) * 3, "dahl", True, marks=pytest.mark.slow),
         pytest.param((3000.0,) * 3, "bingham", True, marks=pytest.mark.slow),
