@@ -330,18 +330,20 @@ def run_predictions(problem: Problem, model: Model) -> list[RunPrediction]:
 
 def coordinates_of_run(run: Run) -> dict[str, Array]:
     """Return the coordinates (n,) of a run; time and history go on where samples are left out."""
-    if isinstance(run, StructureRun) and run.whole is not None:
-        return {name: y[run.keep] for name, y in coordinates_of_run(run.whole).items()}
-    found = coordinates_of(run.dt, run.x, run.v, run.a, run.V, run.force, run.drive)
-    numbers = {name: y for name, y in run.labels.items() if not isinstance(y, str)}
-    measured = {name: one.values for name, one in run.extra.items()}
-    return {**{name: np.full(len(run.x), y) for name, y in numbers.items()}, **measured, **found}
+    all_of, keep = run.remembered
+    found = coordinates_of(
+        all_of.dt, all_of.x, all_of.v, all_of.a, all_of.V, all_of.force, all_of.drive
+    )
+    numbers = {name: y for name, y in all_of.labels.items() if not isinstance(y, str)}
+    constant = {name: np.full(len(all_of.x), y) for name, y in numbers.items()}
+    measured = {name: one.values for name, one in all_of.extra.items()}
+    return {name: y[keep] for name, y in {**constant, **measured, **found}.items()}
 
 
 def at_half_the_step(problem: Problem, model: Model, run: Run) -> Array:
     """Return a model's force (n,) [N] at the samples of a run, evaluated twice as often."""
-    whole = run.whole if isinstance(run, StructureRun) else run
-    if whole is None or whole.finer is None:
+    whole, _ = run.remembered
+    if whole.finer is None:
         return problem.predict(model, halved(run))[::2]
     often = replace(whole, finer=whole.finer.cut(2 * whole.finer.parts))
     again = replace(run, whole=often) if isinstance(run, StructureRun) else often
@@ -352,7 +354,7 @@ def halved(run: Run) -> Run:
     """Return a run with a sample between any two: motion by Hermite's cubic, voltage by a line."""
     x, v, a = run.x, run.v, run.a
     whole: dict[str, Any] = {}
-    if isinstance(run, StructureRun) and run.whole is not None:
+    if isinstance(run, StructureRun):
         keep = np.empty(2 * len(x) - 1, dtype=np.int64)
         keep[::2], keep[1::2] = 2 * run.keep, 2 * run.keep[:-1] + 1
         whole = {"whole": halved(run.whole), "keep": keep}

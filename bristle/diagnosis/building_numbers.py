@@ -20,7 +20,6 @@ from ..identification.building_motion import Response, shear
 from ..identification.building_sites import (
     StructurePair,
     StructureProblem,
-    StructureRun,
     damper_run,
     problems_of,
 )
@@ -240,11 +239,10 @@ def _carried(shaken: Shaken, building: Building, problem: StructureProblem) -> A
     """Return what a building's masses carry below a site's level, as `Problem.force` has it."""
     level, parts = _level(building, problem), []
     for run in problem.runs:
-        assert isinstance(run, StructureRun)
-        assert run.whole is not None
+        whole, keep = run.remembered
         # A run that does not move is left out, and names may be alike: the command is its own.
-        response = next(one for one in shaken.train if one.V is run.whole.V)
-        parts.append(shear(response, building, level)[0][run.keep][run.skip :])
+        response = next(one for one in shaken.train if one.V is whole.V)
+        parts.append(shear(response, building, level)[0][keep][run.skip :])
     return np.concatenate(parts)
 
 

@@ -38,9 +38,8 @@ def patterns_of(trial: Trial, held_out: Problem) -> list[ResidualPattern]:
 
 def late_speed_of(run: Run) -> Array:
     """Return the mean speed (n,) of late [m/s]; it goes on where samples are left out."""
-    if isinstance(run, StructureRun) and run.whole is not None:
-        return late_speed(run.whole.v, run.dt)[run.keep]
-    return late_speed(run.v, run.dt)
+    whole, keep = run.remembered
+    return late_speed(whole.v, run.dt)[keep]
 
 
 def remaining_residual(

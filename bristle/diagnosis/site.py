@@ -136,25 +136,18 @@ def shortened(problem: StructureProblem, seconds: float) -> StructureProblem:
 
     A run whose base does not move within that time is left out.
     """
-    if all(len(_whole(run).x) * run.dt <= seconds for run in problem.runs):
+    if all(len(run.remembered[0].x) * run.dt <= seconds for run in problem.runs):
         return problem
     cut = [_first_samples(run, round(seconds / run.dt)) for run in problem.runs]
     moving: list[Run] = [run for run in cut if len(run.force)]
     return problem.of(moving) if moving else problem
 
 
-def _whole(run: Run) -> Run:
-    assert isinstance(run, StructureRun)
-    assert run.whole is not None
-    return run.whole
-
-
 def _first_samples(run: Run, samples: int) -> StructureRun:
     """Return the first samples of a run, from rest: what a law remembers begins there."""
     assert isinstance(run, StructureRun)
     keep = run.keep[run.keep < samples]
-    whole = _whole(run).of(slice(samples))
-    return replace(run.of(slice(len(keep))), whole=whole)
+    return replace(run.of(slice(len(keep))), whole=run.whole.of(slice(samples)))
 
 
 def decide_site(before: Trial, trials: Sequence[Trial], rule: DecisionRule = SITE) -> Decision:

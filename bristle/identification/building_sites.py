@@ -53,8 +53,13 @@ class StructureRun(Run):
     with memory, and `keep` says which ones count.
     """
 
-    whole: Run | None = field(default=None, repr=False)
-    keep: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    whole: Run = field(kw_only=True, repr=False)
+    keep: Indices = field(kw_only=True)
+
+    @property
+    def remembered(self) -> tuple[Run, Indices]:
+        """The run with all samples, and which of them count."""
+        return self.whole, self.keep
 
     def of(self, part: slice) -> Self:
         """Return the run with these of the samples that count; `whole` stays, for its history."""
@@ -66,10 +71,8 @@ class StructureRun(Run):
 
     def entire(self) -> StructureRun:
         """Return the run with all samples of `whole`, those at rest too."""
-        whole = self.whole
-        assert whole is not None
-        own = {one.name: getattr(whole, one.name) for one in fields(Run)}
-        return StructureRun(**own, whole=whole, keep=np.arange(len(whole.force)))
+        own = {one.name: getattr(self.whole, one.name) for one in fields(Run)}
+        return StructureRun(**own, whole=self.whole, keep=np.arange(len(self.whole.force)))
 
 
 class StructureProblem(Problem):
@@ -163,7 +166,6 @@ class StructureProblem(Problem):
         memory = bool(law.states) or any(
             EFFECTS[e].states or EFFECTS[e].site == "sensor" for e in model.effects
         )
-        assert run.whole is not None
         filtered = run.whole.finer is not None or run.whole.pulse is not None
         seen = run.whole if memory or filtered else run
         x, v, a, V, dt = seen.smoothed if draw is None else seen.drawn(draw)
@@ -226,10 +228,8 @@ def _of(response: Response, run: StructureRun, on_first: bool = False) -> Struct
     And how it was seen, if it is a force on the first level that follows from equilibrium.
     """
     known: dict[str, Any] = {"drive": response.drive or VOLTAGE.name, "labels": response.labels}
-    whole = None
-    if run.whole is not None:
-        pulse = response.pulse if on_first else None
-        whole = replace(run.whole, extra=response.extra, finer=response.finer, pulse=pulse, **known)
+    pulse = response.pulse if on_first else None
+    whole = replace(run.whole, extra=response.extra, finer=response.finer, pulse=pulse, **known)
     extra = {
         name: replace(one, values=one.values[run.keep]) for name, one in response.extra.items()
     }

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from scipy.ndimage import convolve1d
 
-from ..core.arrays import Array, Flags
+from ..core.arrays import Array, Flags, Indices
 from ..data.channels import Label, Labels
 from ..data.corrections import jumps
 from ..data.decimate import Finer, between
@@ -386,6 +386,11 @@ class Run:
             extra={name: one.of(part) for name, one in self.extra.items()},
             finer=self.finer.of(part) if self.finer and dense else None,
         )  # fmt: skip
+
+    @property
+    def remembered(self) -> tuple[Run, Indices | slice]:
+        """The run with all samples that models with memory go through, and which of them count."""
+        return self, slice(None)
 
     @cached_property
     def begun(self) -> Self:

@@ -16,7 +16,7 @@ from ..model.model import Model
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS, Law
 from ..physics.tuples import Inputs
-from .building_sites import StructureProblem, StructureRun, thinned
+from .building_sites import StructureProblem, thinned
 from .error import ForceError, errors_by_run, pooled
 from .fit import Fit, fit, fit_from_starts, refine
 from .low_passed import error_rms, force_rms
@@ -106,8 +106,7 @@ def _line_covariance(problem: StructureProblem, model: Model, columns: list[Arra
 
 def line_columns(run: Run, law: type[Law]) -> Array:
     """Return the force (n, p) of each parameter of a linear law at 1, the others at zero."""
-    whole, keep = (run.whole, run.keep) if isinstance(run, StructureRun) else (run, slice(None))
-    assert whole is not None
+    whole, keep = run.remembered
     q = Inputs(*whole.smoothed, 0.0, 0.0, False)
     zero, none = np.zeros_like(q.x), dict.fromkeys(law.parameters, 0.0)
     own = [law.hooks()["force"](q, (), law.at({**none, name: 1.0})) for name in law.parameters]

@@ -122,11 +122,9 @@ def _samples(runs: list[Run]) -> tuple[list[Run], list[Indices]]:
     """Return the whole runs, from which a memory follows, and which of their samples count."""
     wholes, keeps = [], []
     for run in runs:
-        whole, keep = run, np.arange(len(run.force))
-        if isinstance(run, StructureRun) and run.whole is not None:
-            whole, keep = run.whole, run.keep
+        whole, keep = run.remembered
         wholes.append(whole)
-        keeps.append(keep[run.skip :])
+        keeps.append(np.arange(len(whole.force))[keep][run.skip :])
     return wholes, keeps
 
 
@@ -175,11 +173,9 @@ def _part(base: Model, run: Run, name: str) -> Array:
 
 def _by_command(problem: Problem, base: Model, run: Run, whole: Array, nudge: float) -> Array:
     """Return what a `nudge` [V] of the command adds to the force `whole` (n,) [N], in N/V."""
-    more: Run = replace(run, V=run.V + nudge)
-    if isinstance(run, StructureRun) and run.whole is not None:
-        more = replace(
-            run, V=run.V + nudge, whole=replace(run.whole, V=run.whole.V + nudge)
-        )  # fmt: skip
+    more = replace(run, V=run.V + nudge)
+    if isinstance(more, StructureRun):
+        more = replace(more, whole=replace(more.whole, V=more.whole.V + nudge))
     return (problem.predict(Model(base.law, (), base.values), more) - whole) / nudge
 
 

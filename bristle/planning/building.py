@@ -326,7 +326,6 @@ def _planned(study: Study, stand: Mapping[str, Stated], planner: TablePlanner) -
     """Return the plan that serves the goals of the sites."""
     tests, rows, gain = searched(stand, planner, lambda then: _rows(stand, then))
     shown = [planner.response(one) for one in tests]
-    assert planner.table is not None
     level = planner.table.levels[0]
     return BuildingPlan(
         study.name, tuple(one.test for one in tests),

@@ -13,7 +13,6 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..data.corrections import jumps
-from ..identification.building_sites import StructureRun
 from ..identification.fit import Search
 from ..identification.problem import Expected, Problem, Run, residuals
 from ..learning.signals import ALONG
@@ -63,10 +62,8 @@ class Basis:
 
     def history(self, run: Run) -> Array:
         """Return the coordinate (n,) on a run, at the samples that count."""
-        along, memory = ALONG[self.name], dict(self.memory)
-        if isinstance(run, StructureRun) and run.whole is not None:
-            return along.history(run.whole, memory)[run.keep]
-        return along.history(run, memory)
+        whole, keep = run.remembered
+        return ALONG[self.name].history(whole, dict(self.memory))[keep]
 
     def columns(self, run: Run) -> Array:
         """Return the parts (n, size) on a run, 1 where they are whole."""

@@ -21,7 +21,7 @@ from ..diagnosis.rule import BENCH, DecisionRule
 from ..diagnosis.site import joinable_at
 from ..diagnosis.trials import LONG, joinable, short_search
 from ..errors import StudyError
-from ..identification.building_sites import StructureProblem, StructureRun
+from ..identification.building_sites import StructureProblem
 from ..identification.fit import fit_from_starts, refine
 from ..identification.problem import Problem, Run
 from ..identification.rig import DAMPER
@@ -758,9 +758,9 @@ def _parts(
     return open_parts(opened.before.model, there, own, drive)
 
 
-def largest_motion(runs: Sequence[Any]) -> tuple[float, float]:
+def largest_motion(runs: Sequence[Run]) -> tuple[float, float]:
     """Return the largest displacement [m] and velocity [m/s] of runs of a site."""
-    whole = [one.whole for one in runs if isinstance(one, StructureRun) and one.whole is not None]
+    whole = [one.remembered[0] for one in runs]
     return (
         max(float(np.max(np.abs(one.x))) for one in whole),
         max(float(np.max(np.abs(one.v))) for one in whole),

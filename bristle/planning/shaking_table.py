@@ -176,8 +176,8 @@ class TablePlanner(Planner):
     are motions that may be scaled.
     """
 
-    table: ShakingTable | None = None
-    show: Callable[[list[Measurement]], dict[str, StructureProblem]] | None = None
+    table: ShakingTable = field(kw_only=True)
+    show: Callable[[list[Measurement]], dict[str, StructureProblem]] = field(kw_only=True)
     places: tuple[str, ...] = ()
     records: tuple[Waveform, ...] = ()
     nothing_kept: ClassVar[str] = (
@@ -190,14 +190,12 @@ class TablePlanner(Planner):
 
     def response(self, one: JudgedTest) -> SimulatedTest:
         """Return what a test prescribes, and every output of the simulation."""
-        assert self.table is not None
         signals = one.test.signals(self.limits, self.rate)
         columns = self.table.response(signals)
         assert columns is not None
         return SimulatedTest(signals, columns, one.held_out)
 
     def _look(self, test: Test) -> JudgedTest | None:
-        assert self.table is not None
         for _ in range(TRIES):
             signals = test.signals(self.limits, self.rate)
             columns = self.table.response(signals)
@@ -213,8 +211,6 @@ class TablePlanner(Planner):
         self, test: Test, signals: PrescribedSignals, columns: Columns
     ) -> JudgedTest | None:
         """Return a test that keeps the limits as it would be seen, None where nothing moves."""
-        assert self.table is not None
-        assert self.show is not None
         try:
             found = self.show([self.table.measured(signals, columns)])
         except RecordError:  # the base does not move
