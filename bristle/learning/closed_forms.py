@@ -19,7 +19,7 @@ from ..units import canonical
 from ..user_code.load import defined
 from .curve import Curve, CurveFormula
 from .effect_file import effect_text
-from .fit import SWEEPS, LearnedCurve
+from .fit import SWEEPS, Fitted
 from .rule import LEARN
 
 # The formulas that a learned curve may follow.
@@ -482,20 +482,23 @@ class Closed:
     std: dict[str, float]
 
 
-def close(prepared: Prepared, found: LearnedCurve, forms: Sequence[ClosedForm]) -> Closed | None:
+def close(
+    prepared: Prepared, name: str, best: Fitted, forms: Sequence[ClosedForm]
+) -> Closed | None:
     """Fit the closed forms that may name a curve in its place; return the first that does as well.
 
     Parameters
     ----------
     prepared : runs and the fitted model, as a diagnosis begins with them
-    found : the curve, with the name of its effect
+    name : of the curve's effect
+    best : the curve
     forms : fitted to the curve, the best first
     """
     able = [one for one in forms if one.left <= LEARN.resembles][:CLOSED]
-    return next(filter(None, (fit_closed(prepared, found, one) for one in able)), None)
+    return next(filter(None, (fit_closed(prepared, name, best, one) for one in able)), None)
 
 
-def fit_closed(prepared: Prepared, found: LearnedCurve, form: ClosedForm) -> Closed | None:
+def fit_closed(prepared: Prepared, name: str, best: Fitted, form: ClosedForm) -> Closed | None:
     """Fit a closed form in the place of a learned curve; None where it is clearly worse.
 
     It has fewer numbers, and holds between and beyond the knots: as good is good enough, and better
@@ -504,31 +507,28 @@ def fit_closed(prepared: Prepared, found: LearnedCurve, form: ClosedForm) -> Clo
     Parameters
     ----------
     prepared : runs and the fitted model, as a diagnosis begins with them
-    found : the curve, with the name of its effect
+    name : of the curve's effect
+    best : the curve
     form : fitted to the curve
     """
-    assert found.curve is not None
-    assert found.after is not None
-    formula = formula_of(form, found.curve)
+    formula = formula_of(form, best.curve)
     if not formula.parameters:
         return None
-    text = effect_text(found.name, found.curve, "a trial", formula)
-    base, values = found.after.model, dict(found.after.model.values)
-    values = {k: v for k, v in values.items() if not k.startswith(f"{found.name}.curve[")}
-    values |= {f"{found.name}.{n}": value for n, value, _ in formula.parameters}
-    with defined({found.name: text}):
+    text = effect_text(name, best.curve, "a trial", formula)
+    base, values = best.trial.model, dict(best.trial.model.values)
+    values = {k: v for k, v in values.items() if not k.startswith(f"{name}.curve[")}
+    values |= {f"{name}.{n}": value for n, value, _ in formula.parameters}
+    with defined({name: text}):
         train = prepared.searched.of(prepared.searched.runs)
         held_out = prepared.held_out.of(prepared.held_out.runs)
         model = refine(replace(base, values=values), train, SWEEPS)
         trial = judge(model, train, held_out)
-        worst = (LEARN.as_good if form.left <= LEARN.follows else 1.0) * found.after.train
-        if trial.train > worst or not missing(found.before, trial, prepared.rule):
+        worst = (LEARN.as_good if form.left <= LEARN.follows else 1.0) * best.trial.train
+        if trial.train > worst or not missing(prepared.before, trial, prepared.rule):
             return None
         std = intervals_of(train, model).std
-        given = tuple(
-            (n, model.value(f"{found.name}.{n}"), unit) for n, _, unit in formula.parameters
-        )
-        memory = {f"{found.name}.{n}": n for n, _ in found.curve.memory}
-        own = {f"{found.name}.{n}": n for n, _, _ in formula.parameters} | memory
+        given = tuple((n, model.value(f"{name}.{n}"), unit) for n, _, unit in formula.parameters)
+        memory = {f"{name}.{n}": n for n, _ in best.curve.memory}
+        own = {f"{name}.{n}": n for n, _, _ in formula.parameters} | memory
         own_std = {n: std.get(key, 0.0) for key, n in own.items()}
     return Closed(form, replace(formula, parameters=given), trial, own_std)

@@ -52,17 +52,15 @@ class Fitted:
 
 @dataclass(frozen=True)
 class LearnedCurve:
-    """What `learn` came to: the best curve with its deviations, or why none is kept.
+    """What `learn` came to: the best curve, or why none is kept.
 
-    `curve` and `std` (k,) of its values, in its unit; `before`, `after` the trials without and with
-    it; `others` what else was fitted, best first; `refused` why it is not kept, "" where it is.
+    `before` the trial without it; `best` None where none was fitted; `others` what else was fitted,
+    best first; `refused` why it is not kept, "" where it is.
     """
 
     name: str
-    curve: Curve | None
-    std: tuple[float, ...]
     before: Trial
-    after: Trial | None
+    best: Fitted | None
     others: tuple[Fitted, ...] = ()
     refused: str = ""
 
@@ -88,7 +86,7 @@ def learn(
     chosen = distinct([one for one in promised if one.loss <= worth], TRIED)
     if not chosen:
         why = "No curve lowers the error on stretches of the training runs that it has not seen."
-        return LearnedCurve(name, None, (), before, None, (), why)
+        return LearnedCurve(name, before, None, (), why)
     fitted = _best_first(_fitted(chosen, name, before.model, prepared))
     if fitted[0].trial.train > prepared.rule.clean:
         model = with_law_of(before.model, fitted[0])
@@ -99,9 +97,8 @@ def learn(
     fitted[0] = _finer(fitted[0], name, prepared)
     refusals = [_refusal(before, one, prepared.rule) for one in fitted]
     place = refusals.index("") if "" in refusals else 0
-    kept = fitted[place]
-    others = tuple(one for one in fitted if one is not kept)
-    return LearnedCurve(name, kept.curve, kept.std, before, kept.trial, others, refusals[place])
+    others = (*fitted[:place], *fitted[place + 1 :])
+    return LearnedCurve(name, before, fitted[place], others, refusals[place])
 
 
 def _best_first(fitted: Sequence[Fitted]) -> list[Fitted]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..comparison.names import site_name
 from ..core.text import percent, plain, quantity, with_interval
+from ..diagnosis.trials import Trial
 from ..view import Viewable
 from .closed_forms import Closed, ClosedForm, in_words, name_of, nearest_of
 from .curve import Curve
@@ -45,13 +46,13 @@ class LearnedEffect(Viewable):
     def sentences(self) -> list[str]:
         """Return what was learned, as an engineer would say it."""
         found = self.found
-        if found.refused or found.curve is None or found.after is None:
+        if found.refused or found.best is None:
             return [f"Nothing was learned{self._where()}. {found.refused}"]
-        curve = found.curve
-        fall = 100.0 * (1.0 - _excess(found.after.z) / max(_excess(found.before.z), 1e-12))
+        curve, after = found.best.curve, found.best.trial
+        fall = 100.0 * (1.0 - _excess(after.z) / max(_excess(found.before.z), 1e-12))
         out = [
             f"{self.name} is {curve.words()}{self._where()}. With it the error on held-out runs "
-            f"falls from {found.before.z:.2f} to {found.after.z:.2f} times the noise (z): it "
+            f"falls from {found.before.z:.2f} to {after.z:.2f} times the noise (z): it "
             f"explains {fall:.0f} % of the error beyond noise."
         ]
         best = self.closed.form if self.closed else name_of(self.forms)
@@ -79,19 +80,11 @@ class LearnedEffect(Viewable):
             text = f": the nearest, {in_words(near, curve)}, leaves " if near else ""
             text += f"{percent(near.left, 0)} of its variation" if near else ""
             out.append(f"No formula follows the curve{text}.")
-        return [*out, *self._line()]
+        return [*out, *_line(curve, self.closed.trial if self.closed else after)]
 
     def _where(self) -> str:
         """Return at which site it was learned, for a sentence; "" on a bench."""
         return f" at {site_name(self.site)}" if self.site else ""
-
-    def _line(self) -> list[str]:
-        """Return the sentence about the line of a layer or a storey beside the curve."""
-        curve, trial = self.found.curve, self.closed.trial if self.closed else self.found.after
-        if curve is None or trial is None or not curve.place.is_line:
-            return []
-        stiffness = trial.model.value(trial.model.law_class.stiffness)
-        return [f"Beside it, the linear stiffness there is {plain(stiffness, 4)} N/m."]
 
     def _values(self) -> list[str]:
         assert self.closed is not None
@@ -117,14 +110,14 @@ class LearnedEffect(Viewable):
             "sentences": self.sentences(), "z_before": found.before.z,
             "z_train_before": found.before.train,
         }  # fmt: skip
-        if found.curve is not None and found.after is not None:
-            curve = found.curve
+        if found.best is not None:
+            curve, after = found.best.curve, found.best.trial
             out |= {
-                "z": found.after.z, "z_train": found.after.train, "site": curve.at,
+                "z": after.z, "z_train": after.train, "site": curve.at,
                 "part": curve.part,
                 "along": curve.along, "unit": curve.unit, "along_unit": curve.along_unit,
-                "knots": list(curve.knots), "values": list(curve.values), "std": list(found.std),
-                "memory": dict(curve.memory),
+                "knots": list(curve.knots), "values": list(curve.values),
+                "std": list(found.best.std), "memory": dict(curve.memory),
                 **_levels(curve),
                 "forms": [
                     {"name": one.name, "formula": one.form.text, "values": list(one.values),
@@ -140,6 +133,14 @@ class LearnedEffect(Viewable):
                 ],
             }  # fmt: skip
         return out
+
+
+def _line(curve: Curve, trial: Trial) -> list[str]:
+    """Return the sentence about the line of a layer or a storey beside a curve."""
+    if not curve.place.is_line:
+        return []
+    stiffness = trial.model.value(trial.model.law_class.stiffness)
+    return [f"Beside it, the linear stiffness there is {plain(stiffness, 4)} N/m."]
 
 
 def _of_mode(curve: Curve) -> str:

@@ -13,10 +13,10 @@ from ..core.arrays import Array
 from ..core.text import percent, scale, short_z
 from ..view.blocks import Block, Table, Text, View, view_of
 from ..view.style import BLUE, GREY, PALE, VERMILION, Page, look, png, ramp
-from .closed_forms import Closed, ClosedForm, in_words, name_of, nearest_of
+from .closed_forms import ClosedForm, in_words, name_of, nearest_of
 from .closure import LearnedClosure
 from .curve import Curve
-from .fit import LearnedCurve
+from .fit import Fitted
 from .result import LearnedEffect
 from .signals import GIVEN, RING, response
 from .surface import continues
@@ -63,32 +63,21 @@ FINE = 1000
 """Points at which a closed form is drawn: a ripple turns between two knots."""
 
 
-def curve_png(
-    found: LearnedCurve, forms: Sequence[ClosedForm], closed: Closed | None = None
-) -> bytes:
-    """Return a PNG of a learned curve with its 95 % band.
-
-    Parameters
-    ----------
-    found : the curve, kept
-    forms : fitted to it, the best first
-    closed : the form that its effect has in its place, None for none
-    """
-    return png(draw_curve(found, forms, closed), 110)
+def curve_png(learned: LearnedEffect) -> bytes:
+    """Return a PNG of a learned curve that is kept, with its 95 % band."""
+    return png(draw_curve(learned), 110)
 
 
-def draw_curve(
-    found: LearnedCurve, forms: Sequence[ClosedForm], closed: Closed | None = None
-) -> Page:
+def draw_curve(learned: LearnedEffect) -> Page:
     """Return the figure of a learned curve, drawn and not yet written."""
-    assert found.curve is not None
-    assert found.after is not None
-    curve = found.curve
+    found, best, closed = learned.found, learned.found.best, learned.closed
+    assert best is not None
+    curve = best.curve
     with look():
         where = f" at {site_name(curve.at)}" if curve.place.is_line else ""
         heading = f"{found.name}: {curve.words()}{where}"
         caption = (
-            f"z on held-out runs {short_z(found.before.z)} before, {short_z(found.after.z)} with it"
+            f"z on held-out runs {short_z(found.before.z)} before, {short_z(best.trial.z)} with it"
         )
         caption += f", {short_z(closed.trial.z)} with the formula." if closed is not None else "."
         if curve.across:
@@ -106,9 +95,9 @@ def draw_curve(
         if curve.part == RING:
             _draw_mode(axes, curve)
         elif curve.across:
-            _draw_surface(axes, found)
+            _draw_surface(axes, best)
         else:
-            _draw(axes, found, forms)
+            _draw(axes, best, learned.forms)
     return page
 
 
@@ -129,10 +118,9 @@ def _draw_mode(axes: Axes, curve: Curve) -> None:
     axes.set_title("amplitude of the force shown / of the damper's force")
 
 
-def _draw_surface(axes: Axes, found: LearnedCurve) -> None:
+def _draw_surface(axes: Axes, found: Fitted) -> None:
     """Draw a surface as a family of curves, one for each level of its second signal."""
     curve = found.curve
-    assert curve is not None
     shape = len(curve.levels), len(curve.knots)
     s = np.array(curve.knots)
     y, half = np.array(curve.values).reshape(shape), 1.96 * np.array(found.std).reshape(shape)
@@ -163,9 +151,8 @@ def _draw_surface(axes: Axes, found: LearnedCurve) -> None:
     )  # fmt: skip
 
 
-def _draw(axes: Axes, found: LearnedCurve, forms: Sequence[ClosedForm]) -> None:
+def _draw(axes: Axes, found: Fitted, forms: Sequence[ClosedForm]) -> None:
     curve = found.curve
-    assert curve is not None
     s, y, half = np.array(curve.knots), np.array(curve.values), 1.96 * np.array(found.std)
     across, along = scale(curve.along_unit, float(np.max(np.abs(s))))
     up, unit = scale(curve.unit, float(np.max(np.abs(y))))

@@ -77,11 +77,11 @@ def learn_effect(
     refuse_elsewhere(parts, along, CurvePlace(site), study.settings.beside)
     found = learn(opened, name, parts=parts, along=along)
     told = site if study.settings.has_building else ""
-    if found.refused or found.curve is None:
+    if found.refused or found.best is None:
         return LearnedEffect(found, site=told)
-    forms, closed = tuple(closed_forms(found.curve, found.std)), None
+    forms, closed = tuple(closed_forms(found.best.curve, found.best.std)), None
     if not table:
-        closed = close(opened, found, forms)
+        closed = close(opened, name, found.best, forms)
     if closed is not None:  # the name that the effect's formula has
         forms = (closed.form, *(one for one in forms if one is not closed.form))
     learned = LearnedEffect(found, forms, closed, site=told)
@@ -90,7 +90,7 @@ def learn_effect(
         flaw = flaw_of(name, _text(study, one, name))
         if not flaw:
             return _written(study, one, given) if write else one
-    why = f"{found.curve.words().capitalize()} can be no effect: {flaw}"
+    why = f"{found.best.curve.words().capitalize()} can be no effect: {flaw}"
     return replace(learned, closed=None, found=replace(found, refused=why))
 
 
@@ -168,8 +168,9 @@ def _write(study: Study, given: str, begin: str, text_of: Callable[[str], str]) 
 
 def _text(study: Study, learned: LearnedEffect, name: str) -> str:
     """Return the text of a learned effect's file; its name may be another than in the fit."""
-    curve, closed = learned.found.curve, learned.closed
-    assert curve is not None
+    best, closed = learned.found.best, learned.closed
+    assert best is not None
+    curve = best.curve
     if closed is not None:
         values = closed.trial.model.values  # of an effect that has no file yet
         memory = tuple((n, values[f"{learned.name}.{n}"]) for n, _ in curve.memory)
@@ -190,7 +191,7 @@ def _written(study: Study, learned: LearnedEffect, given: str) -> LearnedEffect:
     file = _write(study, given, "learned", lambda name: _text(study, learned, name))
     name = file.stem
     learned = replace(learned, found=replace(learned.found, name=name))
-    drawn = curve_png(learned.found, learned.forms, learned.closed)
+    drawn = curve_png(learned)
     picture = study.write_report(f"{name}.png", drawn)
     told = json.dumps(learned.as_dict(), indent=2, ensure_ascii=False)
     study.write_report(f"{name}.json", told)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +18,8 @@ from bristle.errors import StudyError
 from bristle.identification.problem import Problem
 from bristle.learning.closed_forms import Closed, formula_of
 from bristle.learning.curve import Curve
-from bristle.learning.fit import LearnedCurve
+from bristle.learning.fit import Fitted, LearnedCurve
+from bristle.learning.result import LearnedEffect
 from bristle.learning.view import draw_curve
 from bristle.model.model import Model
 from bristle.physics.effect import EFFECTS
@@ -36,12 +38,11 @@ def trial(z: float) -> Trial:
     return Trial(Model("bingham"), z, z, 0.1 * z, NONE, NONE)
 
 
-def found_of(refused: str = "") -> LearnedCurve:
-    """Return a spring of 300 N/m that was learned, or refused."""
+def found_of(refused: str = "", **other: Any) -> LearnedCurve:
+    """Return a spring of 300 N/m, or another curve, that was learned, or refused."""
     curve = Curve("force", "displacement", (), tuple(KNOTS), tuple(300.0 * KNOTS))
-    return LearnedCurve(
-        "learned_1", curve, (0.05,) * 13, trial(6.0), trial(1.02), (), refused
-    )  # fmt: skip
+    best = replace(Fitted(curve, (0.05,) * 13, trial(1.02), 1.0), **other)
+    return LearnedCurve("learned_1", trial(6.0), best, (), refused)
 
 
 @pytest.fixture(scope="module")
@@ -214,7 +215,7 @@ def test_the_stiffness_beside_a_curve_is_told(study, learned, monkeypatch):
     learned()
     line = replace(trial(1.01), model=Model("linear_layer", (), {"k": 1012.3}))
     curve = Curve("slip", "slip", (), (0.0004, 0.009), (0.4, 0.8), at="layer")
-    found = replace(found_of(), curve=curve, std=(0.01,) * 2, after=line)
+    found = found_of(curve=curve, std=(0.01,) * 2, trial=line)
     monkeypatch.setattr(curves, "learn", lambda *_, **__: found)
     assert learn_effect(study).sentences()[-1] == (
         "Beside it, the linear stiffness there is 1012 N/m."
@@ -224,7 +225,7 @@ def test_the_stiffness_beside_a_curve_is_told(study, learned, monkeypatch):
 def test_elastic_slip_elements_are_told_one_by_one(study, learned, monkeypatch):
     learned()
     curve = Curve("slip", "slip", (), (0.0004, 0.002, 0.009), (0.4, 0.0, 0.8))
-    found = replace(found_of(), curve=curve, std=(0.01,) * 3)
+    found = found_of(curve=curve, std=(0.01,) * 3)
     monkeypatch.setattr(curves, "learn", lambda *_, **__: found)
     first, second = learn_effect(study).sentences()
     assert first.startswith("learned_1 is parallel elastic-slip elements. With it")
@@ -238,7 +239,7 @@ def test_a_surface_is_told_with_what_its_data_do_not_reach(study, learned, monke
     surface = Curve(
         "force", "displacement", (), knots, values, (8,), across="voltage", levels=levels,
     )  # fmt: skip
-    found = replace(found_of(), curve=surface, std=(0.05,) * 9)
+    found = found_of(curve=surface, std=(0.05,) * 9)
     monkeypatch.setattr(curves, "learn", lambda *_, **__: found)
     told = learn_effect(study)
     assert told.sentences()[0].startswith(
@@ -256,10 +257,10 @@ def test_a_formula_over_a_memory_is_written_with_the_time_that_was_fitted(
     learned()
     knots = np.linspace(0.0, 0.1, 13)  # m/s
     curve = Curve("force", "recent_speed", (("tau", 0.5),), tuple(knots), tuple(30.0 * knots))
-    found = replace(found_of(), curve=curve)
+    found = found_of(curve=curve)
     monkeypatch.setattr(curves, "learn", lambda *_, **__: found)
 
-    def closed(_opened, _found, forms):
+    def closed(_opened, _name, _best, forms):
         formula = formula_of(forms[0], curve)
         values = {f"learned_1.{n}": value for n, value, _ in formula.parameters}
         model = Model("bingham", ("learned_1",), values | {"learned_1.tau": 0.7})
@@ -320,11 +321,9 @@ def test_the_hidden_formula_comes_back_and_the_study_goes_on_with_it(study):
 
 
 def test_a_value_that_the_runs_hardly_tell_flattens_no_others():
-    found = found_of("")
-    assert found.curve is not None
-    y = np.array(found.curve.values)
-    wild = (*found.std[:-1], 100.0 * float(np.ptp(y)))
-    (axes,) = draw_curve(replace(found, std=wild), ()).figure.axes
+    y = 300.0 * KNOTS
+    wild = (*(0.05,) * 12, 100.0 * float(np.ptp(y)))
+    (axes,) = draw_curve(LearnedEffect(found_of(std=wild))).figure.axes
     low, high = axes.get_ylim()
     (line,) = [one for one in axes.lines if one.get_label() == "learned"]
     shown = np.ptp(line.get_ydata())

@@ -101,8 +101,8 @@ def test_a_curve_along_the_pressure_is_learned_and_the_damper_has_it_as_an_input
     study = create_study(tmp_path / "rig", files, law="bingham_standard").study
     identify_study(study)
     found = learn_effect(study, along=["oil_pressure"])
-    assert found.found.curve is not None
-    assert found.found.curve.along == "oil_pressure"
+    assert found.found.best is not None
+    assert found.found.best.curve.along == "oil_pressure"
     assert "a line, 1.2 N/MPa" in " ".join(found.sentences())
     added = add_effects(study, [found.name]).identified
     assert added.after["z_holdout"] < 0.4 * added.before["z_holdout"]
