@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..core.text import cut_short
+from ..core.text import cut_short, plural
 from ._options import Parser, print_json
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def print_findings(file: str, findings: list[Finding], around: Sequence[str] = (
     """
     colour = sys.stdout.isatty()
     counts = {level: sum(finding.level == level for finding in findings) for level in _COLOURS}
-    counted = ", ".join(f"{n} {level}{'s' * (n > 1)}" for level, n in counts.items() if n)
+    counted = ", ".join(plural(n, level) for level, n in counts.items() if n)
     last = f"{file}: {counted}"
     if not counts["error"]:
         last = f"{file}: ok{', ' + counted if counted else ''}"

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..core.text import command
+from ..core.text import command, plural
 from ..errors import StudyError
 from ..view.blocks import Next
 from ._options import (
@@ -87,7 +87,7 @@ def _print(study: Study, done: CorrectedChannels, dry: bool) -> None:
         return
     runs = len(study.settings.runs)
     what = "would change" if dry else "are corrected"
-    print(f"{study.folder}: channels {what}; {runs} run{'s' * (runs != 1)} read by them.")
+    print(f"{study.folder}: channels {what}; {plural(runs, 'run')} read by them.")
     for one in done.changes:
         print(f"  {one.channel:16} {one.text}")
     for note in done.notes:
@@ -142,7 +142,7 @@ def print_added(
     extended: Extended, by_plan: Performed | None = None, *, as_json: bool = False
 ) -> None:
     """Print the runs that were added, what differs from their plan, and the next command."""
-    from ..core.text import capital, command
+    from ..core.text import capital
     from ..study.study import unknown_to_model
 
     folder, runs = extended.study.folder, extended.runs
@@ -154,7 +154,7 @@ def print_added(
             "notes": notes,
             "plan": [asdict(pair) for pair in by_plan.pairs] if by_plan else None,
         })  # fmt: skip
-    print(f"{folder}: {len(runs)} run{'s' * (len(runs) != 1)} added.")
+    print(f"{folder}: {plural(len(runs), 'run')} added.")
     for run in runs:
         print(f"  {run.name:28} {run.role}")
     for note in notes:

@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 from ..errors import UnitError
 from ..units import parse
+from .text import plural
 
 Level = Literal["error", "warning", "note", "pass"]
 _OF_ONE_RUN = ("run gain", "run sign", "run zero")
@@ -89,7 +90,7 @@ def sentence(finding: Finding, group: Sequence[Finding]) -> str:
     if others < 1:
         return f"{where}{finding.text}"
     what = "the same" if len({one.text for one in group}) == 1 else "similar"
-    also = _range_text(group) or f"{what} in {others} other run{'s' * (others > 1)}"
+    also = _range_text(group) or f"{what} in {plural(others, 'other run')}"
     return f"{where}{finding.text} ({also})"
 
 

@@ -187,6 +187,11 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
     return f' Did you mean "{close[0]}"?' if close else ""
 
 
+def plural(count: int, what: str) -> str:
+    """Return how many there are of something: "1 run", "12 runs"."""
+    return f"{count} {what}{'s' * (count != 1)}"
+
+
 def joined(names: Sequence[str]) -> str:
     """Return names as a list in words: "a, b and c"."""
     return " and ".join(part for part in (", ".join(names[:-1]), *names[-1:]) if part)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..core.arrays import Array, Flags, Indices
-from ..core.text import plain
+from ..core.text import plain, plural
 from ..errors import RecordError
 from ..physics.motion_file import GAP
 from .noise import SHORTEST, is_switched, stretches
@@ -212,7 +212,7 @@ def evenly(time: Array, channels: dict[str, Array], lines: Indices, name: str, p
     if len(breaks):
         widest = int(np.argmax(np.diff(time)))
         notes.append(
-            f"{len(breaks)} gap{'s' * (len(breaks) > 1)} in time, the longest from "
+            f"{plural(len(breaks), 'gap')} in time, the longest from "
             f"{time[widest]:.6g} s to {time[widest + 1]:.6g} s: cut there"
         )
     longest = max(made, key=lambda one: len(one.even))
@@ -460,7 +460,7 @@ def _pieces(
     if gaps:
         start, stop = max(gaps, key=lambda gap: gap[1] - gap[0])
         notes.append(
-            f"values are missing in {len(gaps)} place{'s' * (len(gaps) > 1)}, the longest from "
+            f"values are missing in {plural(len(gaps), 'place')}, the longest from "
             f"{one.even[start]:.6g} s to {one.even[stop - 1]:.6g} s: cut there"
         )
     return [

@@ -16,6 +16,7 @@ from xml.etree.ElementTree import Element, SubElement, fromstring
 
 from ..core.files import writing
 from ..core.progress import Count, tell
+from ..core.text import plural
 from ..errors import BuildError
 from ..fmu import documentation
 from ..fmu.archive import write_archive
@@ -147,7 +148,7 @@ def libraries(
     BuildError
         What is wrong with the first platform that fails, once all are done.
     """
-    tell(f"compiling {name} for {len(platforms)} platform{'s' * (len(platforms) > 1)}")
+    tell(f"compiling {name} for {plural(len(platforms), 'platform')}")
     count = Count(f"{name}: library", len(platforms))
 
     def counted(one: Platform) -> bytes:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.arrays import Array
-from ..core.text import percent, plain
+from ..core.text import percent, plain, plural
 from ..data.channels import channel_unit, label_name, label_text
 from ..data.checks.motion import ACROSS, with_motion_across
 from ..data.measurement import Measurement
@@ -76,7 +76,7 @@ def reach_in_words(study: Study, runs: Runs, ranges: Ranges) -> str:
         told.append(f"{label_name(label.name)} {levels}")
     share = history_steps(study.steps())[-1].share
     off = "" if share is None else f" Held-out error: {percent(share)} of the force (RMS)."
-    counted = f"{len(runs.train)} run{'s' * (len(runs.train) > 1)}"
+    counted = plural(len(runs.train), "run")
     return f"Fitted to {counted} (data {study.data[:14]}): {'; '.join(told)}.{off}"
 
 

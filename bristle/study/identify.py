@@ -12,7 +12,7 @@ import numpy as np
 
 from ..comparison.names import site_name
 from ..core.progress import tell
-from ..core.text import listed, percent, short_z, unknown
+from ..core.text import listed, percent, plural, short_z, unknown
 from ..data.checks.motion import check_force, velocity_of_run
 from ..data.cut_off import saturated_share
 from ..data.measurement import Measurement
@@ -323,7 +323,7 @@ def why(found: Identified) -> str:
     runs, held_out = len(found.train.runs), len(found.holdout.runs) if found.holdout else 0
     lost = ", ".join(found.unidentified)
     return (
-        f"fit to {runs} training run{'s' * (runs != 1)}, tested on {held_out} held out; "
+        f"fit to {plural(runs, 'training run')}, tested on {held_out} held out; "
         f"{found.fit.agreed} of {found.fit.starts} starts agree"
         + (f"; the data do not identify {lost}" if lost else "")
     )

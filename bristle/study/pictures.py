@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core.arrays import Array
-from ..core.text import percent
+from ..core.text import percent, plural
 from ..data.channels import DRIVE
 from ..data.checks.motion import velocity_of_run
 from ..data.measurement import Measurement
@@ -63,7 +63,7 @@ def draw_data_check(runs: list[Measurement], level: str = "") -> Page:
 
 def _heading(runs: list[Measurement]) -> str:
     total = sum(run.duration for run in runs)
-    return f"{len(runs)} run{'s' * (len(runs) > 1)}, {total:.4g} s together"
+    return f"{plural(len(runs), 'run')}, {total:.4g} s together"
 
 
 def _subtitle(runs: list[Measurement]) -> str:

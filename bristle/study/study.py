@@ -17,7 +17,7 @@ from filelock import FileLock, Timeout
 
 from ..core.config import other_schema, toml_content
 from ..core.files import read_json, write_json, write_whole
-from ..core.text import command, listed, shown, written
+from ..core.text import command, listed, plural, shown, written
 from ..data.channels import ChannelSpec
 from ..data.corrections import Correction
 from ..data.measurement import Measurement, names_of_files
@@ -521,7 +521,7 @@ class Study(Viewable):
         now = self._state()
         if now != self._seen:
             steps = len(now[0]) - len(self._seen[0])
-            what = f"{abs(steps)} step{'s' * (abs(steps) != 1)} " if steps else ""
+            what = f"{plural(abs(steps), 'step')} " if steps else ""
             how = "added" if steps > 0 else "undone" if steps < 0 else "model.toml was edited"
             raise StudyError(
                 f"{self.folder}: the model has been changed meanwhile ({what}{how}), so that this "

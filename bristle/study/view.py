@@ -27,6 +27,7 @@ from ..core.text import (
     listed,
     percent,
     plain,
+    plural,
     quantity,
     scale,
     short_z,
@@ -371,8 +372,8 @@ def building_view(found: IdentifiedBuilding) -> View:
             Next(fmu, "makes an FMU of it"),
         ]
     return View(
-        f"{fit.building.name}: stiffness and damping of {len(levels)} "
-        f"level{'s' * (len(levels) > 1)}, masses as given.",
+        f"{fit.building.name}: stiffness and damping of {plural(len(levels), 'level')}, "
+        "masses as given.",
         (
             Table(
                 ("stiffness below", "given [N/m]", "found [N/m]", "95 %"), stiffnesses, (1, 2)
@@ -472,7 +473,7 @@ def _extra(name: str, runs: Sequence[Measurement]) -> list[str]:
     high = max(float(one.values.max()) for one in there)
     factor, unit = scale(there[0].unit, max(abs(low), abs(high)))
     few = len(runs) - len(there)
-    lacking = f" (not in {few} run{'s' * (few > 1)})" if few else ""
+    lacking = f" (not in {plural(few, 'run')})" if few else ""
     extra = f"extra channel{lacking}"
     return [name, unit, plain(factor * low, 4), plain(factor * high, 4), "", "", extra]
 
@@ -496,7 +497,7 @@ def created_view(created: Created) -> View:
     ]
     wrong = command("study", "channels", folder, "--channel", "CHANNEL=COLUMN@UNIT")
     return View(
-        f"{folder}: a study of {len(settings.runs)} run{'s' * (len(settings.runs) > 1)}, "
+        f"{folder}: a study of {plural(len(settings.runs), 'run')}, "
         f"{_held_out(len(settings.runs), held)} held out.",
         (
             Table(("channel", "column", "read so because"), rows),
@@ -530,7 +531,7 @@ def study_view(study: Study) -> View:
         settings.title,
         (
             Text(
-                f"{study.folder}: {len(roles)} run{'s' * (len(roles) > 1)}, "
+                f"{study.folder}: {plural(len(roles), 'run')}, "
                 f"{_held_out(len(roles), held_out)} held out"
                 f"{f', {test} for the test at the end' if test else ''}."
             ),

@@ -14,7 +14,7 @@ from itertools import islice
 import numpy as np
 
 from ...core.arrays import Array
-from ...core.text import listed
+from ...core.text import listed, plural
 from ...errors import RecordError
 from ...physics.motion_file import shortened, without_end_mark
 from ...units import parse as parse_unit
@@ -204,7 +204,7 @@ def _refuse_channels_as_rows(lines: list[str], name: str) -> None:
         named = listed([f'"{shortened(one)}"' for one in begin], 4)
         first = f"{'they begin' if len(rows) > 1 else 'it begins'} with {named}"
         raise RecordError(
-            f"{name}: {len(rows)} row{'s' * (len(rows) != 1)} of about {wide} values; {first}. "
+            f"{name}: {plural(len(rows), 'row')} of about {wide} values; {first}. "
             "Here its channels are rows, and a column a channel is right: transpose the table."
         )
 

@@ -15,7 +15,7 @@ from datetime import date, datetime, time
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
-from ...core.text import listed
+from ...core.text import listed, plural
 from ...errors import RecordError
 from ...units import parse as parse_unit
 from ..channels import meaning, quantity_of_unit
@@ -154,7 +154,7 @@ def _chosen(
             continue
         read.append((sheet, table))
         titles = listed([column.text for column in table.columns], 4)
-        rows = f"{table.rows} row{'s' * (table.rows != 1)}"
+        rows = plural(table.rows, "row")
         holds[sheet.title] = f'"{sheet.title}" ({rows}: {titles})'
     if not read:
         for sheet in sheets:
