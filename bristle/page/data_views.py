@@ -86,8 +86,8 @@ def _channel_rows(study: Study, runs: Sequence[Measurement]) -> list[dict[str, A
 
 def _role(study: Study, run: Measurement) -> str:
     """Return the role of a measured run; that of the file where one run is split in time."""
-    file, piece = place_of_run(study.folder, study.settings, run.name)
-    roles = [one.role for one in study.settings.runs if (one.file, one.piece) == (file, piece)]
+    place = place_of_run(study.folder, study.settings, run.name)
+    roles = [one.role for one in study.settings.runs if one.place == place]
     return roles[0] if roles else TEST
 
 

@@ -159,14 +159,14 @@ def data_table(study: Study, measured: Sequence[Measurement]) -> tuple[list[str]
         )  # fmt: skip
     names = names_of_runs(study.settings)
     for one in study.settings.excluded:
-        rows.append([names[one.file, one.piece], "left out", *["-"] * (len(header) - 2)])
+        rows.append([names[one.place], "left out", *["-"] * (len(header) - 2)])
     return header, rows
 
 
 def _roles(study: Study, measured: Sequence[Measurement]) -> dict[str, str]:
     """Return what each measurement is for, by its name, as the report calls it."""
     settings = study.settings
-    listed = {(run.file, run.piece): run.role for run in settings.runs}
+    listed = {run.place: run.role for run in settings.runs}
     roles = {one.name: listed[place_of_run(study.folder, settings, one.name)] for one in measured}
     if sum(role != TEST for role in listed.values()) == 1:  # it is split in time
         split = study.runs()

@@ -144,8 +144,8 @@ def make_folder(
     of_file = dict(zip(names, about, strict=True))
     copies = _copies(found, is_test)
     kept = [one for one in found if one not in copies]
-    assigned, said = roles_of([one.name for one in kept], [is_test[one.file] for one in kept])
-    of_part = dict(zip(kept, [run.role for run in assigned], strict=True))
+    roles, said = roles_of([one.name for one in kept], [is_test[one.file] for one in kept])
+    of_part = dict(zip(kept, roles, strict=True))
     every = [_with_facts(one, of_part.get(one, EXCLUDE), of_file) for one in found]
     settings = Settings(
         title or folder.name, rig, tuple(run for run in every if run.role != EXCLUDE),
@@ -582,7 +582,7 @@ def _copies(parts: Sequence[_Part], is_test: Mapping[str, bool]) -> dict[_Part, 
 def _copies_text(folder: Path, copies: Mapping[_Part, _Part], settings: Settings) -> Iterator[str]:
     """Yield what is done about each copy, and the command that changes it."""
     names = names_of_runs(settings)
-    roles = {(run.file, run.piece): run.role for run in settings.runs}
+    roles = {run.place: run.role for run in settings.runs}
     for one, other in copies.items():
         places = [(f"data/{part.file}", part.piece) for part in (one, other)]
         copy, first = (names[place] for place in places)

@@ -109,7 +109,7 @@ def proposed(
     runs, excluded = (_uncorrected(some, names) for some in (settings.runs, settings.excluded))
     every = (*settings.runs, *settings.excluded)
     fewer = {
-        (new.file, new.piece): new.corrections
+        new.place: new.corrections
         for old, new in zip(every, (*runs, *excluded), strict=True)
         if old.corrections != new.corrections
     }

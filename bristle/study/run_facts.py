@@ -36,7 +36,7 @@ from ..data.tone import Tone, amplitude_fits, frequency_fits, label_doubts, time
 from ..errors import RecordError, StudyError, UnitError
 from ..units import convert, same_dimension
 from .runs import names_of_runs
-from .study_file import EXCLUDE, ROLES, TEST, RunFile, Settings
+from .study_file import EXCLUDE, ROLES, TEST, Place, RunFile, Settings
 
 # What the titles of a table of runs tell: `I [A]` is the current, `T (°C)` the temperature.
 
@@ -137,6 +137,11 @@ def _fact(name: str, value: Any, *, level: bool = False) -> Facts:
     return Facts({name: value}) if level else Facts(labels={name: value})
 
 
+def _joined(found: Sequence[Facts], others: Sequence[Facts]) -> list[Facts]:
+    """Return the facts of runs with others of the same runs."""
+    return [one.and_(other) for one, other in zip(found, others, strict=True)]
+
+
 def facts_of(
     files: Sequence[Path],
     choices: RunChoices,
@@ -167,10 +172,10 @@ def facts_of(
         files = [Path(f"{one.parent.name}_{one.name}") for one in files]
     reading = reading_of([*files, *others], [*tones, *([None] * len(others))])
     found, notes = _offered(files, choices, commanded, reading, tones)
-    found = [one.and_(other) for one, other in zip(columns or found, found, strict=True)]
+    found = _joined(columns or found, found)
     for pattern in choices.levels:
         rows = [_matched(file, pattern, reading, level=True) for file in files]
-        found = [one.and_(other) for one, other in zip(found, rows, strict=True)]
+        found = _joined(found, rows)
         (name,) = rows[0].levels
         told = f"{name} of each run: from the names of the files, by '{pattern}'"
         notes.append(
@@ -178,10 +183,10 @@ def facts_of(
         )
     for pattern in choices.labels:
         rows = [_matched(file, pattern, reading, level=False) for file in files]
-        found = [one.and_(other) for one, other in zip(found, rows, strict=True)]
+        found = _joined(found, rows)
     if choices.table is not None:
         rows = rows_of_table(choices.table, paths, commanded)
-        found = [one.and_(other) for one, other in zip(found, rows, strict=True)]
+        found = _joined(found, rows)
         notes += _of_table(rows, choices.table)
     asked = {name for one in found for name in one.levels}
     if commanded and asked:
@@ -311,7 +316,7 @@ def _offered(
             same = not reading.digits.get(name) and _fits(files, pattern, reading)
             text += f". --level '{pattern}' says the same" if same else ""
         notes.append(text)
-        found = [one.and_(other) for one, other in zip(found, more, strict=True)]
+        found = _joined(found, more)
     return found, [*notes, *(reading.why if notes else ())]
 
 
@@ -437,7 +442,7 @@ def of_columns(
         else:  # without a unit a number that no run shares only names the runs
             tells = within == 0.0 and 1 < len({*levels}) < len(levels)
         if tells:
-            facts = [one.and_(_fact(name, y)) for one, y in zip(facts, levels, strict=True)]
+            facts = _joined(facts, [_fact(name, y) for y in levels])
             seen = listed(_texts(name, sorted({levels[k] for k in open_}), level=False), 6)
             notes.append(f'{label_name(name)} of each run: from the column "{column.text}": {seen}')
             constant += [column.text] if within == 0.0 else []
@@ -596,8 +601,8 @@ def _is_chosen(file: Path, one: str) -> bool:
     return file == Path(one) or any(fnmatchcase(text, one) for text in (file.name, file.as_posix()))
 
 
-def roles_of(names: list[str], closed: list[bool]) -> tuple[list[RunFile], list[str]]:
-    """Return the runs with their roles, and the notes that tell why.
+def roles_of(names: list[str], closed: list[bool]) -> tuple[list[str], list[str]]:
+    """Return the roles of runs, and the notes that tell why.
 
     Parameters
     ----------
@@ -610,7 +615,7 @@ def roles_of(names: list[str], closed: list[bool]) -> tuple[list[RunFile], list[
     test = listed(name for name, role in zip(names, every, strict=True) if role == TEST)
     if test:
         notes.append(f"test runs, which no fit and no verdict sees: {test}")
-    return [RunFile(f"data/{n}", role) for n, role in zip(names, every, strict=True)], notes
+    return every, notes
 
 
 def roles_by_name(names: list[str], *, added: bool = False) -> tuple[list[str], list[str]]:
@@ -682,10 +687,8 @@ def a_third(names: Sequence[str]) -> tuple[set[int], str]:
 # Other roles for the runs of a study: which runs are meant, and what must be left.
 
 
-def roles_by_place(
-    path: Path, settings: Settings, roles: Mapping[str, str]
-) -> dict[tuple[str, int], str]:
-    """Return the new roles of runs by file and piece.
+def roles_by_place(path: Path, settings: Settings, roles: Mapping[str, str]) -> dict[Place, str]:
+    """Return the new roles of runs by their places.
 
     Parameters
     ----------
@@ -702,27 +705,27 @@ def roles_by_place(
     names = names_of_runs(settings)
     known: dict[str, RunFile] = {}
     for run in every:
-        known |= {names[run.file, run.piece]: run, run.name: run}
-    found: dict[tuple[str, int], str] = {}
+        known |= {names[run.place]: run, run.name: run}
+    found: dict[Place, str] = {}
     for name, role in roles.items():
         if role not in (*ROLES, EXCLUDE):
             raise StudyError(f'role "{role}" of {name}; there are {", ".join((*ROLES, EXCLUDE))}.')
         if name not in known:
             there = listed(names.values())
             raise StudyError(f'{path}: no run is called "{name}"; there are {there}.')
-        found[known[name].file, known[name].piece] = role
+        found[known[name].place] = role
     refuse_too_few(path, settings, found)
     return found
 
 
-def refuse_too_few(path: Path, settings: Settings, found: Mapping[tuple[str, int], str]) -> None:
+def refuse_too_few(path: Path, settings: Settings, found: Mapping[Place, str]) -> None:
     """Refuse roles that leave nothing to fit to, or nothing to judge by.
 
     Parameters
     ----------
     path : of study.toml, for messages
     settings : its content
-    found : the roles that change, by file and piece of a run
+    found : the roles that change, by the place of a run
 
     Raises
     ------
@@ -730,7 +733,7 @@ def refuse_too_few(path: Path, settings: Settings, found: Mapping[tuple[str, int
         With the command that gives the missing role too.
     """
     every = (*settings.runs, *settings.excluded)
-    roles = [found.get((run.file, run.piece), run.role) for run in every]
+    roles = [found.get(run.place, run.role) for run in every]
     fitted, judged = roles.count(ROLES[0]), roles.count(ROLES[1])
     if fitted + judged == 0:
         raise StudyError(f"{path}: no run would be left; some for training are needed.")
@@ -738,9 +741,7 @@ def refuse_too_few(path: Path, settings: Settings, found: Mapping[tuple[str, int
         lacking, other = ("held out", ROLES[1]) if fitted else ("for training", ROLES[0])
         names = names_of_runs(settings)
         there = listed(
-            names[run.file, run.piece]
-            for run, role in zip(every, roles, strict=True)
-            if role in ROLES[:2]
+            names[run.place] for run, role in zip(every, roles, strict=True) if role in ROLES[:2]
         )
         order = command("study", "roles", path.parent, *_options(found, names), f"--{other}", "RUN")
         raise StudyError(
@@ -750,9 +751,7 @@ def refuse_too_few(path: Path, settings: Settings, found: Mapping[tuple[str, int
         )
 
 
-def _options(
-    found: Mapping[tuple[str, int], str], names: Mapping[tuple[str, int], str]
-) -> Iterator[str]:
+def _options(found: Mapping[Place, str], names: Mapping[Place, str]) -> Iterator[str]:
     """Yield the options of `bristle study roles` that give runs these roles."""
     for role in (*ROLES, EXCLUDE):
         chosen = [names[place] for place, own in found.items() if own == role]

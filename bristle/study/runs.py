@@ -20,7 +20,7 @@ from ..data.table import Table
 from ..errors import StudyError
 from ..identification.prepare import SHORTEST
 from ..identification.run_start import MOVING
-from .study_file import RunFile, Settings
+from .study_file import Place, RunFile, Settings
 
 SPLIT = 0.7
 """Share of a single run that is for training; the rest is held out."""
@@ -197,24 +197,24 @@ def read_runs(folder: Path, settings: Settings, role: str | None = None) -> list
             count.begins(run.file)
             table = read_table(folder / run.file, settings.split)
             tables[run.file] = pieces_of(table, settings.split, settings.channels)
-        name = names[run.file, run.piece]
+        name = names[run.place]
         found += _measured(folder, settings, run, name, tables[run.file])
     return found
 
 
-def names_of_runs(settings: Settings) -> dict[tuple[str, int], str]:
-    """Return what the measurement of each run is called, by file and piece; no two are alike.
+def names_of_runs(settings: Settings) -> dict[Place, str]:
+    """Return what the measurement of each run is called, by its place; no two are alike.
 
     Runs that are left out count: the others keep their names when one is left out or comes back.
     """
     every = (*settings.runs, *settings.excluded)
     ends = [f" run {run.piece}" if run.piece else "" for run in every]
     names = names_of_files([run.file for run in every], ends)
-    return {(run.file, run.piece): name for run, name in zip(every, names, strict=True)}
+    return {run.place: name for run, name in zip(every, names, strict=True)}
 
 
-def place_of_run(folder: Path, settings: Settings, name: str) -> tuple[str, int]:
-    """Return file and piece of the run with a name, or of that with a part of this name.
+def place_of_run(folder: Path, settings: Settings, name: str) -> Place:
+    """Return the place of the run with a name, or of that with a part of this name.
 
     Raises
     ------
@@ -222,7 +222,7 @@ def place_of_run(folder: Path, settings: Settings, name: str) -> tuple[str, int]
         If no run has such a name.
     """
     known = names_of_runs(settings)
-    places = {known[run.file, run.piece]: (run.file, run.piece) for run in settings.runs}
+    places = {known[run.place]: run.place for run in settings.runs}
     own = [one for one in places if is_part(name, one)]
     if not own:
         raise StudyError(
@@ -259,13 +259,13 @@ LEFT = 0.25
 class RunCorrections:
     """What is set right in a run, from what was found in its parts.
 
-    `name` of the run, `place` its file and piece in study.toml; `notes` sentences on parts that do
+    `name` of the run, and its `place`; `notes` sentences on parts that do
     not show what is corrected; `apart` sentences on what is not corrected, for no single value is
     right for all parts.
     """
 
     name: str
-    place: tuple[str, int]
+    place: Place
     corrections: tuple[Correction, ...]
     notes: tuple[str, ...] = ()
     apart: tuple[str, ...] = ()
@@ -296,7 +296,7 @@ def joined_corrections(
     """
     sizes = dict.fromkeys(found, 1) if samples is None else samples
     names = names_of_runs(settings)
-    parts: dict[tuple[str, int], list[str]] = {}
+    parts: dict[Place, list[str]] = {}
     for name in {**found, **sizes}:
         parts.setdefault(place_of_run(folder, settings, name), []).append(name)
     return [
@@ -308,7 +308,7 @@ def joined_corrections(
 
 def _of_run(
     name: str,
-    place: tuple[str, int],
+    place: Place,
     found: Mapping[str, Sequence[Correction]],
     sizes: Mapping[str, int],
 ) -> RunCorrections:

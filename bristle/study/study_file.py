@@ -137,6 +137,10 @@ EXCLUDE = "exclude"
 """The role of runs that are left out: nothing reads them."""
 
 
+Place = tuple[str, int]
+"""A run's file and its number there, from 1; 0 in a file that holds one."""
+
+
 @dataclass(frozen=True)
 class RunFile:
     """One `[[runs]]`: the file, relative to the study, and its role, of `ROLES` or `EXCLUDE`.
@@ -152,6 +156,11 @@ class RunFile:
     labels: Mapping[str, Label] = field(default_factory=dict)
     piece: int = 0
     corrections: tuple[Correction, ...] = ()
+
+    @property
+    def place(self) -> Place:
+        """Where it is."""
+        return self.file, self.piece
 
     @property
     def name(self) -> str:
@@ -550,19 +559,23 @@ def with_mask(text: str) -> str:
     return "\n".join([*lines[:first], line, *lines[first:]])
 
 
-def with_roles(text: str, roles: Mapping[tuple[str, int], str]) -> str:
+def _place_of(table: Mapping[str, Any]) -> Place:
+    return table["file"], table.get("piece", 0)
+
+
+def with_roles(text: str, roles: Mapping[Place, str]) -> str:
     """Return the text of a study.toml with other roles of runs, all else as it was.
 
     Parameters
     ----------
     text : of the file
-    roles : by file and piece of the run, its piece 0 where the file holds one
+    roles : by the place of the run
     """
     import tomlkit
 
     document: Any = tomlkit.parse(text)
     for table in document["runs"]:
-        role = roles.get((table["file"], table.get("piece", 0)))
+        role = roles.get(_place_of(table))
         if role is not None:
             before = table.get("role", "train")
             table["role"] = role
@@ -583,19 +596,19 @@ def with_runs(text: str, runs: Sequence[RunFile]) -> str:
     return tomlkit.dumps(document)
 
 
-def with_corrections(text: str, found: Mapping[tuple[str, int], Sequence[Correction]]) -> str:
+def with_corrections(text: str, found: Mapping[Place, Sequence[Correction]]) -> str:
     """Return the text of a study.toml with more corrections of runs, all else as it was.
 
     Parameters
     ----------
     text : of the file
-    found : corrections by file and piece of the run, its piece 0 where the file holds one
+    found : corrections by the place of the run
     """
     import tomlkit
 
     document: Any = tomlkit.parse(text)
     for table in document["runs"]:
-        corrections = found.get((table["file"], table.get("piece", 0)))
+        corrections = found.get(_place_of(table))
         if corrections is None:
             continue
         known = [Correction(**one) for one in table.unwrap().get("correct", [])]
@@ -607,7 +620,7 @@ def with_channels(
     text: str,
     channels: Mapping[str, ChannelSpec | None],
     extra: Mapping[str, ChannelSpec | None],
-    corrections: Mapping[tuple[str, int], Sequence[Correction]],
+    corrections: Mapping[Place, Sequence[Correction]],
     device: str = "",
 ) -> str:
     """Return the text of a study.toml with channels read in another way, all else as it was.
@@ -618,7 +631,7 @@ def with_channels(
     ----------
     text : of the file
     channels, extra : where a channel is from now on, None for those that are no longer read
-    corrections : those that are left, by file and piece of the runs that lose some
+    corrections : those that are left, by the places of the runs that lose some
     device : the one that the study is about: its brace_force is called force
     """
     import tomlkit
@@ -640,7 +653,7 @@ def with_channels(
             table.add(tomlkit.nl())
             document[key][place] = table
     for table in document["runs"]:
-        left = corrections.get((table["file"], table.get("piece", 0)))
+        left = corrections.get(_place_of(table))
         if left:
             table["correct"] = corrections_as_toml(left)
         elif left is not None:

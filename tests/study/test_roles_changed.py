@@ -190,5 +190,5 @@ def test_no_level_of_a_campaign_is_wholly_held_out() -> None:
     ],
 )
 def test_names_tell_what_is_held_out_where_they_mean_it(names, held) -> None:
-    runs, _ = roles_of([f"{name}.csv" for name in names], [False] * len(names))
-    assert [Path(run.file).stem for run in runs if run.role == "holdout"] == held
+    roles, _ = roles_of([f"{name}.csv" for name in names], [False] * len(names))
+    assert [name for name, role in zip(names, roles, strict=True) if role == "holdout"] == held
