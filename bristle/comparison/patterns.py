@@ -156,14 +156,8 @@ def correlation_time(r: Array) -> float:
     return float(max(1.0, tau[stop[0]] if len(stop) else tau.max()))
 
 
-def residual_patterns(
-    residuals: Sequence[Array],
-    raw: Sequence[Array],
-    coordinates: Sequence[Mapping[str, Array]],
-    *,
-    flips: int = FLIPS,
-) -> list[ResidualPattern]:
-    """Return every coordinate with its share of the residual; the most telling one first.
+class Finder:
+    """Searches the same runs for the place of a residual, and of what is left of it.
 
     Parameters
     ----------
@@ -176,12 +170,6 @@ def residual_patterns(
     flips : int
         How many random signs of blocks say what chance would give.
     """
-    finder = Finder(residuals, raw, coordinates, flips)
-    return finder.ranked(finder.normalised)
-
-
-class Finder:
-    """Searches the same runs for the place of a residual, and of what is left of it."""
 
     def __init__(
         self,

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.signal import welch
 
-from ..comparison.patterns import ResidualPattern, residual_patterns
+from ..comparison.patterns import Finder, ResidualPattern
 from ..comparison.predictions import coordinates_of_run, late_speed
 from ..core.arrays import Array
 from ..identification.building_sites import StructureRun
@@ -33,7 +33,8 @@ def patterns_of(trial: Trial, held_out: Problem) -> list[ResidualPattern]:
         along = coordinates_of_run(run)
         along["rest"] = late_speed_of(run)
         coordinates.append({name: values[run.skip :][kept] for name, values in along.items()})
-    return residual_patterns(normalised, raw, coordinates, flips=FLIPS)
+    finder = Finder(normalised, raw, coordinates, FLIPS)
+    return finder.ranked(finder.normalised)
 
 
 def late_speed_of(run: Run) -> Array:

@@ -82,18 +82,16 @@ class Equilibrium(NamedTuple):
     share: Array
 
 
-def identify_structure(
-    measurements: list[Measurement], building: Building, *, damper: bool | None = None
-) -> StructureFit:
+def identify_structure(measurements: list[Measurement], building: Building) -> StructureFit:
     """Return a building's stiffnesses and damping ratios from its response.
+
+    If a damper's force was not measured, nothing can be said of a storey that it acts across alone:
+    on the first level, of what is below.
 
     Parameters
     ----------
     measurements : one or more runs with the ground acceleration and every level's motion
     building : masses and start values; of matrices that are no chain only the storeys' springs move
-    damper : whether a damper acts on the first level of a building whose file has no devices;
-        None: if a force, voltage or current was measured. If a damper's force was not, nothing can
-        be said of a storey that it acts across alone: on the first level, of what is below.
 
     Raises
     ------
@@ -102,7 +100,7 @@ def identify_structure(
         comes out negative.
     """
     runs = responses(measurements, building, draws=0, looser=LOOSER)
-    unknown = _unknown(runs, damper)
+    unknown = _unknown(runs)
     if not equations_of(building.size, unknown).levels:
         raise RecordError(
             f"{measurements[0].name}: force was not measured, and {building.name!r} has no storey "
@@ -234,9 +232,7 @@ def _finish(
     )  # fmt: skip
 
 
-def equilibrium(
-    measurements: list[Measurement], building: Building, *, damper: bool | None = None
-) -> Equilibrium:
+def equilibrium(measurements: list[Measurement], building: Building) -> Equilibrium:
     """Return what equilibrium leaves of runs, such as those that a building was not fitted to.
 
     Raises
@@ -245,18 +241,17 @@ def equilibrium(
         If a channel is missing, or the building has other levels than were measured.
     """
     runs = responses(measurements, building, draws=0, looser=LOOSER)
-    unknown = _unknown(runs, damper)
+    unknown = _unknown(runs)
     return _left(
         runs, building, EquilibriumSystem(building, runs, np.array(building.stiffnesses), unknown)
     )
 
 
-def _unknown(runs: list[Response], damper: bool | None) -> Device | None:
+def _unknown(runs: list[Response]) -> Device | None:
     """Return the damper whose force was not measured in every run, None where there is none."""
-    device = runs[0].device
-    if damper is None or device.name:
-        damper = any(run.damped for run in runs)
-    return device if damper and not all(run.force is not None for run in runs) else None
+    damped = any(run.damped for run in runs)
+    told = all(run.force is not None for run in runs)
+    return runs[0].device if damped and not told else None
 
 
 def _modes_of_springs(building: Building, stiffness: Array, told: Sequence[int]) -> Flags:

@@ -13,7 +13,6 @@ from bristle.comparison.patterns import (
     Finder,
     block_length,
     correlation_time,
-    residual_patterns,
 )
 from bristle.comparison.predictions import coordinates_of
 
@@ -22,9 +21,10 @@ DT = 0.002
 
 def found(held):
     """Return the patterns of a residual."""
-    return residual_patterns(
+    finder = Finder(
         [h.normalised for h in held], [h.residual for h in held], [h.along() for h in held]
     )
+    return finder.ranked(finder.normalised)
 
 
 @pytest.mark.slow  # hundreds of comparisons: the rate of false alarms
