@@ -12,11 +12,12 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
 from bristle.core.finding import Finding
+from bristle.core.progress import tell
 from bristle.data.measurement import Measurement
 from bristle.diagnosis.joint_search import TrialsByLaw
 from bristle.diagnosis.law_choice import choose, search
 from bristle.diagnosis.law_trials import LawTrial, try_laws
-from bristle.diagnosis.prepared import Prepared, Progress, corrected, silent
+from bristle.diagnosis.prepared import Prepared, corrected
 from bristle.diagnosis.rig_runs import BenchRuns
 from bristle.diagnosis.site import diagnose_damper
 from bristle.diagnosis.site_diagnosis import SiteDiagnosis
@@ -81,51 +82,48 @@ def bare_laws(train: Sequence[Measurement]) -> list[Found]:
     ValueError
         If the training runs carry no verdict.
     """
-    _, data, rows = _laws(train, silent)
+    _, data, rows = _laws(train)
     ranked = sorted((row.trial for row in rows), key=lambda trial: trial.rms)
     return [Found(one.model, (), one.z, data.faults, False) for one in ranked]
 
 
-def steps(train: Sequence[Measurement], say: Progress = silent) -> tuple[Found, Found, Found]:
+def steps(train: Sequence[Measurement]) -> tuple[Found, Found, Found]:
     """Return the models that training runs lead to: law with effects, with curves, with a closure.
 
     Parameters
     ----------
     train : the training runs; a part of them judges the steps
-    say : called with a few words at each stage
 
     Raises
     ------
     ValueError
         If the training runs carry no verdict.
     """
-    split, data, rows = _laws(train, say)
+    split, data, rows = _laws(train)
 
-    by_law = TrialsByLaw(data, say)
+    by_law = TrialsByLaw(data)
     chosen = by_law.settled(choose(search(rows, by_law)), data)
-    finding, opened = _with_effects(split, chosen.finding, chosen.prepared, say)
+    finding, opened = _with_effects(split, chosen.finding, chosen.prepared)
     free = _found(_with_unproven(opened, finding.trials, rows), ())
-    return (free, *_with_curves(opened, say))
+    return (free, *_with_curves(opened))
 
 
-def _laws(
-    train: Sequence[Measurement], say: Progress
-) -> tuple[Runs, BenchRuns, tuple[LawTrial, ...]]:
+def _laws(train: Sequence[Measurement]) -> tuple[Runs, BenchRuns, tuple[LawTrial, ...]]:
     """Return training runs split in two, prepared, and the trials of all laws on them."""
     split = runs_of(list(train), [])
-    data = BenchRuns(split.train, split.holdout, Model(DEFAULT), say=say)
+    data = BenchRuns(split.train, split.holdout, Model(DEFAULT))
     if data.lacking is not None:
         raise ValueError(str(data.lacking))
-    say("trying every law")
+    tell("trying every law")
     return split, data, try_laws(*data.damper, Model(DEFAULT), bends=data.bends)
 
 
 def _with_effects(
-    split: Runs, finding: SiteDiagnosis, opened: Prepared, say: Progress
+    split: Runs, finding: SiteDiagnosis, opened: Prepared
 ) -> tuple[SiteDiagnosis, Prepared]:
     """Add effects as long as one is named; see `study auto`."""
     while finding.kind == "effect" and finding.model is not None:
-        say(f"{finding.model.law} + {' + '.join(finding.model.effects)}")
+        tell(f"{finding.model.law} + {' + '.join(finding.model.effects)}")
         model = _identified(finding.model, opened.problem)
         again = BenchRuns(split.train, split.holdout, model, identified=True).prepare(DAMPER)
         opened = again
@@ -148,7 +146,7 @@ def _with_unproven(
     return replace(opened, before=judge(model, opened.problem, opened.held_out))
 
 
-def _with_curves(opened: Prepared, say: Progress) -> tuple[Found, Found]:
+def _with_curves(opened: Prepared) -> tuple[Found, Found]:
     """Learn curves as long as one lowers the error beyond chance and the model is not full.
 
     Then a closure: the second one has it, where it is kept.
@@ -157,19 +155,20 @@ def _with_curves(opened: Prepared, say: Progress) -> tuple[Found, Found]:
     with ExitStack() as stack:
         while len(opened.before.model.effects) < MOST_EFFECTS:
             name = f"{NAME}{len(curves) + 1}"
-            say(f"{name} (z {opened.before.z:.2f})")
+            tell(f"{name} (z {opened.before.z:.2f})")
             learned = learn(opened, name)
-            if learned.refused or learned.curve is None or learned.after is None:
+            if learned.refused or learned.best is None:
                 break
-            curves = (*curves, learned.curve)
-            stack.enter_context(defined({name: effect_text(name, learned.curve, "a benchmark")}))
+            curve = learned.best.curve
+            curves = (*curves, curve)
+            stack.enter_context(defined({name: effect_text(name, curve, "a benchmark")}))
             opened = replace(
-                opened, before=learned.after, problem=opened.problem.of(opened.problem.runs),
+                opened, before=learned.best.trial, problem=opened.problem.of(opened.problem.runs),
                 held_out=opened.held_out.of(opened.held_out.runs), part=None,
             )  # fmt: skip
         opened = _with_unproven(opened)
         found = _found(opened, curves)
-        say("a closure")
+        tell("a closure")
         return found, replace(found, closed=not learn_closure(opened, CLOSURE, names=False).refused)
 
 

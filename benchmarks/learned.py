@@ -39,9 +39,8 @@ from bristle.examples.hidden import Scales
 from bristle.examples.rigs import CENTRE, ROUGH, Damper, Signals
 from bristle.identification.rig import DAMPER
 from bristle.learning.closed_forms import close, closed_forms, name_of
-from bristle.learning.curve import Curve
 from bristle.learning.effect_file import effect_text
-from bristle.learning.fit import LearnedCurve, learn
+from bristle.learning.fit import Fitted, learn
 from bristle.model.model import Model
 from bristle.physics.building import Building, from_data
 from bristle.user_code.load import defined
@@ -343,10 +342,10 @@ def _learned(opened: Prepared, form: str) -> Answer:
         while len(told) < MOST and (not told or opened.before.z > ADEQUATE):
             name = f"learned_{len(told) + 1}"
             found = learn(opened, name)
-            if found.refused or found.curve is None or found.after is None:
+            if found.refused or found.best is None:
                 told = told or [{"why": found.refused}]
                 break
-            one, text, trial = _closed(opened, found, found.curve, form)
+            one, text, trial = _closed(opened, found.name, found.best, form)
             told.append(one)
             stack.enter_context(defined({name: text}))
             opened = replace(
@@ -358,24 +357,22 @@ def _learned(opened: Prepared, form: str) -> Answer:
     return {**out, "more": more} if more else out
 
 
-def _closed(
-    opened: Prepared, found: LearnedCurve, curve: Curve, form: str
-) -> tuple[Answer, str, Trial]:
+def _closed(opened: Prepared, name: str, best: Fitted, form: str) -> tuple[Answer, str, Trial]:
     """Return what is told of a curve, its effect's text, and the trial of the model with it."""
-    assert found.after is not None
-    out: Answer = {"part": curve.part, "along": curve.along, "z_table": found.after.z}
+    curve = best.curve
+    out: Answer = {"part": curve.part, "along": curve.along, "z_table": best.trial.z}
     if curve.across:
         out["across"] = curve.across
-    forms, trial, formula = closed_forms(curve, found.std), found.after, None
+    forms, trial, formula = closed_forms(curve, best.std), best.trial, None
     if forms:
-        closed = close(opened, found, forms)
-        best = closed.form if closed else forms[0]
+        closed = close(opened, name, best, forms)
+        shown = closed.form if closed else forms[0]
         if closed:
             trial, formula = closed.trial, closed.formula
         right = RIGHT.get(form, {}).get(curve.along, set())
-        named = (closed is not None or name_of(forms) is not None) and best.name in right
-        out |= {"name": best.name, "left": best.left, "closed": bool(closed), "named": named}
-    return out, effect_text(found.name, curve, "a benchmark", formula), trial
+        named = (closed is not None or name_of(forms) is not None) and shown.name in right
+        out |= {"name": shown.name, "left": shown.left, "closed": bool(closed), "named": named}
+    return out, effect_text(name, curve, "a benchmark", formula), trial
 
 
 run, main = asked(

@@ -8,6 +8,7 @@ from math import inf
 
 from ..comparison.conditions import label_errors, label_sentence, with_levels
 from ..comparison.predictions import run_predictions
+from ..core.progress import tell
 from ..data.channels import Labels, varying
 from ..data.measurement import Measurement
 from ..errors import RecordError
@@ -25,7 +26,7 @@ from .experiments import separating
 from .inconsistent_runs import contradicted
 from .joint_search import law_and_effects
 from .law_trials import OtherLaw, better_law, try_laws
-from .prepared import Prepared, Progress, of_layer, silent
+from .prepared import Prepared, of_layer
 from .remaining import patterns_of, remaining_residual
 from .rig_runs import RigRuns, runs_of_rig
 from .site import Trials, diagnose_damper, diagnose_line, joinable_at, noise_is_all
@@ -169,7 +170,6 @@ def diagnose_rig(
     any_law: bool = False,
     named: str = "",
     kept: KeptFits | None = None,
-    say: Progress = silent,
 ) -> Diagnosis:
     """Return what a rig's model is missing, and at which of its sites.
 
@@ -185,7 +185,6 @@ def diagnose_rig(
         effects that can join them
     named : the present law with its variant, "" where nobody chose one
     kept : fits of laws that are known already, and where those that are made go
-    say : called with a few words at each stage
 
     Raises
     ------
@@ -193,9 +192,7 @@ def diagnose_rig(
         If a run lacks a channel that is needed, is too short for a fit, or the building has other
         levels than were measured; if a law is sought and no run shows a damper.
     """
-    runs = runs_of_rig(
-        train, holdout, present, building, identified=identified, any_law=any_law, say=say
-    )
+    runs = runs_of_rig(train, holdout, present, building, identified=identified, any_law=any_law)
     if runs.lacking is not None:
         return insufficient(runs.lacking)
     shown = DAMPER in runs.sites()
@@ -203,50 +200,50 @@ def diagnose_rig(
         raise RecordError(
             "no law of a damper can be sought: the runs have neither its force nor its command."
         )
-    findings, laws = diagnose_lines(runs, say), None
+    findings, laws = diagnose_lines(runs), None
     if any_law:
-        found, prepared, laws = law_and_effects(runs, findings, named, kept, say)
+        found, prepared, laws = law_and_effects(runs, findings, named, kept)
     else:
         runs.correct(findings)
         if not shown:
             return conclude(findings, runs.context(None))
-        found, prepared = _at_damper(runs, say)
-    say("whether runs contradict each other")
+        found, prepared = _at_damper(runs)
+    tell("whether runs contradict each other")
     found = settled(found, prepared, runs, findings)
     law = f"on {laws.name}, " if laws is not None else ""
-    say(f"verdict {law}{found.briefly}")
+    tell(f"verdict {law}{found.briefly}")
     if laws is None and prepared.bench:
-        found = _beside_other_laws(found, prepared, runs.bends, say)
+        found = _beside_other_laws(found, prepared, runs.bends)
     findings[DAMPER] = with_evidence(found, prepared)
     return replace(conclude(findings, runs.context(prepared)), laws=laws)
 
 
-def _at_damper(runs: RigRuns, say: Progress) -> tuple[SiteDiagnosis, Prepared]:
+def _at_damper(runs: RigRuns) -> tuple[SiteDiagnosis, Prepared]:
     """Return what a damper lacks, beside the numbers of a building that its force follows from.
 
     They are adjusted beside the best single effect: what a second one does they may do as well.
     """
     prepared = runs.prepare(DAMPER)
     with counted(MOST_SPENT if prepared.before.model.effects else inf) as effort:
-        made = None if noise_is_all(prepared) else Trials(prepared, say, effort=effort)
+        made = None if noise_is_all(prepared) else Trials(prepared, effort=effort)
         suits = False
         if prepared.problem.reconstructed:
-            single, _ = diagnose_damper(prepared, say, made, pairs=False, excess=0.0)
+            single, _ = diagnose_damper(prepared, made, pairs=False, excess=0.0)
             suits = runs.suit(single)
         if not suits:
-            found, prepared = diagnose_damper(prepared, say, made)
+            found, prepared = diagnose_damper(prepared, made)
             if found.kind == "unknown" and effort.spent and made and not made.pairs:
                 found = replace(found, reasons=(*found.reasons, NO_PAIRS))
     if suits:
-        found, prepared = diagnose_damper(runs.prepare(DAMPER), say)
+        found, prepared = diagnose_damper(runs.prepare(DAMPER))
     return confirmed(found, prepared), prepared
 
 
-def diagnose_lines(runs: RigRuns, say: Progress = silent) -> dict[str, SiteDiagnosis]:
+def diagnose_lines(runs: RigRuns) -> dict[str, SiteDiagnosis]:
     """Return what the isolation layer and the storeys lack, by site; nothing on a bench."""
     findings: dict[str, SiteDiagnosis] = {}
     for site in runs.lines():
-        say(f"{site}: effects of the structure")
+        tell(f"{site}: effects of the structure")
         prepared = runs.prepare(site)
         found = settled(diagnose_line(site, prepared), prepared, runs, findings)
         findings[site] = with_evidence(found, prepared)
@@ -273,9 +270,7 @@ def settled(
     return excused if excused is not found else contradicted(found, prepared)
 
 
-def _beside_other_laws(
-    found: SiteDiagnosis, prepared: Prepared, bends: bool, say: Progress
-) -> SiteDiagnosis:
+def _beside_other_laws(found: SiteDiagnosis, prepared: Prepared, bends: bool) -> SiteDiagnosis:
     """Return a diagnosis that leaves an error with how much of it is the form of the law.
 
     Effects that leave an error are not named where another law explains the runs without them.
@@ -285,7 +280,7 @@ def _beside_other_laws(
         return found
     if judged.z <= prepared.rule.clean or not found.noise_known:
         return found
-    say("trying every law")
+    tell("trying every law")
 
     def better(than: Trial) -> OtherLaw | None:
         laws = try_laws(prepared.searched, prepared.held_out, than.model, bends=bends)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import inf
 
+from ..core.progress import tell
 from ..data.run_labels import labels_of
 from ..identification.fit import is_rough
 from ..identification.histories import Effort, counted
@@ -22,7 +23,7 @@ from .law_choice import (
     survivors,
 )
 from .law_trials import LawTrial, fitted_anew, not_finite, try_laws
-from .prepared import Prepared, Progress, silent
+from .prepared import Prepared
 from .rig_runs import RigRuns
 from .site import Trials, diagnose_damper, noise_is_all, with_zero_free
 from .site_diagnosis import SiteDiagnosis
@@ -34,7 +35,6 @@ def law_and_effects(
     findings: dict[str, SiteDiagnosis],
     named: str,
     kept: KeptFits | None,
-    say: Progress,
 ) -> tuple[SiteDiagnosis, Prepared, LawVerdict]:
     """Return what the law that a damper has misses, what its look began with, and how all laws do.
 
@@ -42,22 +42,22 @@ def law_and_effects(
     ----------
     runs : of the rig, which show a damper
     findings : what the lines lack; what they tell of the rig is set right
-    named, kept, say : as `diagnose_rig` takes them
+    named, kept : as `diagnose_rig` takes them
     """
     present = runs.part(DAMPER)
     if runs.damper[0].reconstructed:  # the building's numbers are asked for with a law
-        say("trying every law, with the building as its file has it")
+        tell("trying every law, with the building as its file has it")
         first = try_laws(*runs.damper, present, bends=runs.bends)
         runs.suppose(simplest(first).trial.model)
     runs.correct(findings)
-    chosen, laws = _searched(runs, present, named, kept, say)
+    chosen, laws = _searched(runs, present, named, kept)
     if runs.suit(chosen.finding):  # what was kept was fitted to the force of the file's numbers
-        chosen, laws = _searched(runs, present, named, None, say)
+        chosen, laws = _searched(runs, present, named, None)
     return chosen.finding, chosen.prepared, laws
 
 
 def _searched(
-    runs: RigRuns, present: Model, named: str, kept: KeptFits | None, say: Progress
+    runs: RigRuns, present: Model, named: str, kept: KeptFits | None
 ) -> tuple[LawAndEffects, LawVerdict]:
     """Return the law that the runs ask for, with its effects, and how all laws do; suppose it.
 
@@ -66,17 +66,17 @@ def _searched(
     another one then comes nearer, the next one is.
     """
     there = runs.in_part()
-    say("trying every law")
+    tell("trying every law")
     rows = try_laws(*there.damper, present, bends=runs.bends, kept=kept)
     if kept:
         kept.stands(rows[0].law, rows[0].trial.effects, rows[0].trial.z)
-    by_law = TrialsByLaw(there, say, kept)
+    by_law = TrialsByLaw(there, kept)
     with counted(MOST_SPENT) as by_law.effort:
         pairs = search(rows, by_law, by_law.enough, by_law.promise)
         nearest = min(pairs, key=lambda pair: pair.reach().z)
         by_law.excess = missed_by(nearest.reach(), nearest.prepared.problem)
         if by_law.excess:
-            say("what no law explains counts beside the noise: fitting the laws anew")
+            tell("what no law explains counts beside the noise: fitting the laws anew")
             train, held_out = (one.with_excess(by_law.excess) for one in there.damper)
             rows = fitted_anew(rows, train, held_out)
             pairs = search(by_law.left_of(rows, pairs), by_law, by_law.enough)
@@ -114,12 +114,11 @@ class TrialsByLaw:
     Parameters
     ----------
     runs : of the rig
-    say : called with a few words at each stage
     kept : where trials are kept, and told what comes nearest
     """
 
-    def __init__(self, runs: RigRuns, say: Progress = silent, kept: KeptFits | None = None) -> None:
-        self.runs, self.say, self.kept = runs, say, kept
+    def __init__(self, runs: RigRuns, kept: KeptFits | None = None) -> None:
+        self.runs, self.kept = runs, kept
         self._nearest: Trial | None = None
         self.made: dict[str, Trials] = {}
         self.excess = 0.0  # N2, see `diagnose_damper`
@@ -165,16 +164,14 @@ class TrialsByLaw:
         if made is None:
             prepared = self.runs.prepare(DAMPER, row.trial)
             if noise_is_all(prepared):
-                return LawAndEffects(
-                    row, *diagnose_damper(prepared, self.say, pairs=pairs, excess=0.0)
-                )
-            self.say(f"effects that {row.law} lacks (error / noise {row.trial.z:.2f})")
+                return LawAndEffects(row, *diagnose_damper(prepared, pairs=pairs, excess=0.0))
+            tell(f"effects that {row.law} lacks (error / noise {row.trial.z:.2f})")
             free = with_zero_free(prepared)
             if free is not prepared:
                 self._shortened.add(row.law)
-            made = self.made[row.law] = Trials(free, self.say, kept=self.kept, law=row.law)
+            made = self.made[row.law] = Trials(free, kept=self.kept, law=row.law)
         elif pairs:
-            self.say(f"two effects that {row.law} lacks")
+            tell(f"two effects that {row.law} lacks")
             if self.effort.spent and any(is_rough(one.model) for one in made.single[:2]):
                 self.not_tried[row.law] = True  # behind a joint
         found = self._lacking(row, made, pairs)
@@ -198,19 +195,19 @@ class TrialsByLaw:
             return found
         row = found.row
         if self.runs is not runs:
-            self.say(f"fitting {law} to all runs")
+            tell(f"fitting {law} to all runs")
             (row,) = fitted_anew([row], *runs.damper)
         prepared = runs.prepare(DAMPER, row.trial)
         # What explains nothing with the zero free explains no more without, but for a dependence on
         # a label, which the free zero may hide: else no search begins anew.
         anew = found.explains or labels_of([run.labels for run in prepared.problem.runs])
         earlier = None if shortened and anew else made
-        again = Trials(prepared, self.say, earlier, made if shortened else None)
+        again = Trials(prepared, earlier, made if shortened else None)
         # Where two effects explained nothing they are not sought once more.
         whole = self._lacking(row, again, found.explains and law in self._two)
         together = whole.finding.together or found.finding.together
         return replace(whole, finding=replace(whole.finding, together=together))
 
     def _lacking(self, row: LawTrial, made: Trials, pairs: bool) -> LawAndEffects:
-        found = diagnose_damper(made.prepared, self.say, made, pairs=pairs, excess=self.excess)
+        found = diagnose_damper(made.prepared, made, pairs=pairs, excess=self.excess)
         return LawAndEffects(row, *found)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from operator import is_
@@ -93,12 +93,6 @@ ENOUGH, FEWEST = 30_000, 8
 LASTS = 150.0
 """Seconds, about, of that part at the most: where samples are far apart a model with a joint takes
 many steps from one to the next."""
-
-Progress = Callable[[str], None]
-
-
-def silent(_text: str) -> None:
-    """Say nothing."""
 
 
 @dataclass(frozen=True)

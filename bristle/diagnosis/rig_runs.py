@@ -14,6 +14,7 @@ from copy import copy
 from dataclasses import replace
 
 from ..core.finding import Finding
+from ..core.progress import tell
 from ..core.text import joined
 from ..data.channels import DRIVE
 from ..data.checks.runs import tells_a_bend
@@ -43,13 +44,11 @@ from .prepared import (
     DRAWS,
     Insufficient,
     Prepared,
-    Progress,
     corrected,
     lacking_in_building,
     lacking_on_bench,
     median_noise,
     part_of,
-    silent,
     too_few,
     with_samples,
 )
@@ -256,7 +255,6 @@ def runs_of_rig(
     *,
     identified: bool = False,
     any_law: bool = False,
-    say: Progress = silent,
 ) -> RigRuns:
     """Return the runs of a bench, or of a building where there is one.
 
@@ -266,11 +264,10 @@ def runs_of_rig(
     present : the model as it is: the damper's law with the effects of all sites
     building : the building that the damper is in, None for a test bench
     identified, any_law : as `BenchRuns` and `BuildingRuns` take them
-    say : called with a few words at each stage
     """
     if building is None:
-        return BenchRuns(train, holdout, present, identified=identified, say=say)
-    return BuildingRuns(train, holdout, present, building, any_law=any_law, say=say)
+        return BenchRuns(train, holdout, present, identified=identified)
+    return BuildingRuns(train, holdout, present, building, any_law=any_law)
 
 
 class BuildingRuns(RigRuns):
@@ -282,7 +279,6 @@ class BuildingRuns(RigRuns):
     present : the model as it is, with the effects of all sites
     building : its masses are taken as known
     any_law : whether the damper's law is sought: then those samples count that every law tells
-    say : called with a few words at each stage
 
     Attributes
     ----------
@@ -298,20 +294,19 @@ class BuildingRuns(RigRuns):
         building: Building,
         *,
         any_law: bool = False,
-        say: Progress = silent,
     ) -> None:
         building = with_damper(building)
         self._device = building.device(building.studied)
-        self._building, self._say, self._any_law = building, say, any_law
+        self._building, self._any_law = building, any_law
         self.bends = tells_a_bend(train)
-        say("looking for sensor faults")
+        tell("looking for sensor faults")
         self._sensors = tuple(faults_in_building([*train, *holdout], building))
         right = [without_faults(list(runs), self._sensors, building) for runs in (train, holdout)]
         self._noise = median_noise([*right[0], *right[1]])
         ends = [f"{end}_displacement" for end in _ends(building)]
         self._anchored = [n for n in ends if not all(r.has(n) for part in right for r in part)]
         self.lacking = lacking_in_building([*train, *holdout], right, self._sensors, self._noise)
-        say("smoothing the motion of each level")
+        tell("smoothing the motion of each level")
         found = responses([*right[0], *right[1]], building)
         found, self._present = corrected_for_delay(found, replace(present, law=present.base_law))
         self._train, self._holdout = found[: len(right[0])], found[len(right[0]) :]
@@ -350,7 +345,7 @@ class BuildingRuns(RigRuns):
         return f"storey{storey}" if storey else "layer"
 
     def _correct_load_cell(self, site: str, findings: dict[str, SiteDiagnosis]) -> None:
-        self._say(f"{site}: the load cell")
+        tell(f"{site}: the load cell")
         level = self._device.lower + 1
         late = load_cell(findings[site], self._train, self._holdout, self._building, level=level)
         if late is None:
@@ -363,7 +358,7 @@ class BuildingRuns(RigRuns):
             self._present = _late(self._present, findings[site])
 
     def _correct_building(self, findings: Mapping[str, SiteDiagnosis]) -> None:
-        self._say("damper: what the building's file leaves open")
+        tell("damper: what the building's file leaves open")
         storeys = {one: found for one, found in findings.items() if one.startswith("storey")}
         self._straight = self._straight and all(one.kind == "none" for one in storeys.values())
         given = 0 if self._building.isolated else 1
@@ -443,7 +438,7 @@ class BuildingRuns(RigRuns):
         if site != DAMPER:
             return prepare_line(site, train, held_out, self.part(site), self._sensors, self._noise)
         if before is None:
-            self._say("damper: its law, then effects")
+            tell("damper: its law, then effects")
             model = refine(fit_damper(train, self.part(DAMPER)).model, train)
             before = judge(model, train, held_out)
         # A force that no load cell shows cannot be late.
@@ -501,7 +496,6 @@ class BenchRuns(RigRuns):
     train, holdout : measurements to fit to, and those that decide
     present : the model as it is, whose effects must act on a bench
     identified : whether its values were fitted before: they are then refined, not sought anew
-    say : called with a few words at each stage
 
     Attributes
     ----------
@@ -516,19 +510,18 @@ class BenchRuns(RigRuns):
         present: Model,
         *,
         identified: bool = False,
-        say: Progress = silent,
     ) -> None:
         self._present = replace(present, law=present.base_law)
-        self._identified, self._say = identified, say
+        self._identified = identified
         recorded = [*train, *holdout]
         self.bends = tells_a_bend(train)
         self._driven = any(run.has(name) for run in recorded for name in DRIVE)
-        say("looking for sensor faults")
+        tell("looking for sensor faults")
         self.faults = tuple(sensor_faults(recorded))
         self._noise = median_noise(recorded)
         reasons = lacking_on_bench(recorded, self.faults)
         if not reasons:
-            say("smoothing the motion")
+            tell("smoothing the motion")
             right = corrected(train, self.faults), corrected(holdout, self.faults)
             used = with_samples(right[0]), with_samples(right[1])
             roles = zip(("for training", "held out"), right, used, strict=True)
@@ -555,7 +548,7 @@ class BenchRuns(RigRuns):
         """Return what the diagnosis begins with; see `RigRuns`."""
         problem, held_out = self.damper
         if before is None:
-            self._say("fitting the present model")
+            tell("fitting the present model")
             present = self._present
             if self._identified:
                 model = refine(present, problem)

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..comparison.patterns import ResidualPattern
 from ..core.finding import Finding
+from ..core.progress import tell
 from ..identification.building_sites import StructureProblem, StructureRun
 from ..identification.fit import fit, is_rough, refine
 from ..identification.histories import Effort, left
@@ -40,7 +41,7 @@ from .decision import (
     suffices,
     unexplained,
 )
-from .prepared import Prepared, Progress, of_layer, silent
+from .prepared import Prepared, of_layer
 from .remaining import patterns_of
 from .rule import BENCH, SENSOR, SITE, DecisionRule
 from .site_diagnosis import SiteDiagnosis, of_decision
@@ -208,7 +209,6 @@ class Trials:
     Parameters
     ----------
     prepared : the runs and the present model
-    say : is told what is being done
     earlier : the same trials by other weights or of fewer runs, whose ends are where these begin
     free : those with the zero of the force fitted along, where they were made of fewer runs
     kept, law : where trials that are made from the very start are kept, and taken up, as those of
@@ -223,14 +223,13 @@ class Trials:
     def __init__(
         self,
         prepared: Prepared,
-        say: Progress = silent,
         earlier: Trials | None = None,
         free: Trials | None = None,
         kept: KeptFits | None = None,
         law: str = "",
         effort: Effort | None = None,
     ) -> None:
-        self.prepared, self.say = prepared, say
+        self.prepared = prepared
         self.before = prepared.before
         self.pairs: list[Trial] = []
         self.closed = False
@@ -244,7 +243,7 @@ class Trials:
         self._weighed: dict[float, Trials] = {}
         if earlier is None:
             try_labels(prepared)
-        say("trying every effect inside the model")
+        tell("trying every effect inside the model")
         self.single = self._all(self.before, None)
 
     @property
@@ -258,17 +257,15 @@ class Trials:
             prepared = self.prepared.with_excess(excess)
             before = refine(self.before.model, prepared.problem)
             prepared = replace(prepared, before=judge(before, prepared.problem, prepared.held_out))
-            self._weighed[excess] = Trials(prepared, self.say, self)
+            self._weighed[excess] = Trials(prepared, self)
         return self._weighed[excess]
 
     @property
     def freed(self) -> Trials:
         """The trials with the zero of the force fitted along, made once."""
         if self._freed is None:
-            self.say("the zero of the force is fitted along with every effect")
-            self._freed = Trials(
-                self.prepared.freed, self.say, self._begun_free, effort=self._effort
-            )
+            tell("the zero of the force is fitted along with every effect")
+            self._freed = Trials(self.prepared.freed, self._begun_free, effort=self._effort)
         return self._freed
 
     @cached_property
@@ -278,7 +275,7 @@ class Trials:
 
     def grow(self, first: Trial) -> list[Trial]:
         """Return the trials of all effects added to a trial's model."""
-        self.say(f"no single effect suffices: adding a second one to {first.effects[-1]}")
+        tell(f"no single effect suffices: adding a second one to {first.effects[-1]}")
         grown = self._all(first, SECONDS)
         self.pairs += grown
         return grown
@@ -287,7 +284,7 @@ class Trials:
         """Return the trials of a pair's members alone."""
         if pair.effects not in self._alone:
             prepared = self.prepared
-            self.say(f"each of {' and '.join(pair.effects)} alone, as they were fitted together")
+            tell(f"each of {' and '.join(pair.effects)} alone, as they were fitted together")
             alone = try_members(pair, self.before.model, prepared.searched, prepared.held_out)
             lesser = min(one.z for one in alone) < min(one.z for one in self.single)
             self._alone[pair.effects] = self._on_all_runs(alone) if lesser else alone
@@ -468,7 +465,6 @@ def _significant(problem: Problem, model: Model) -> bool:
 
 def diagnose_damper(
     prepared: Prepared,
-    say: Progress = silent,
     made: Trials | None = None,
     *,
     pairs: bool = True,
@@ -479,7 +475,6 @@ def diagnose_damper(
     Parameters
     ----------
     prepared : what the look begins with
-    say : is told what is being done
     made : the trials of single effects, where they were made before
     pairs : whether two effects are tried where no single one suffices
     excess : variance [N2] that counts beside the noise, see `problem.excess_of`; None for what
@@ -494,20 +489,20 @@ def diagnose_damper(
     if noise_is_all(prepared):
         decision = as_noise(before, ())
         return _with_zero(of_decision(decision, before), prepared, decision), prepared
-    made, decision = _decided(prepared, say, made, pairs)
+    made, decision = _decided(prepared, made, pairs)
     freed = free_zero(prepared, decision)
     if freed is not None:
-        again, other = _decided(freed, say, made.freed, pairs)
+        again, other = _decided(freed, made.freed, pairs)
         decided = other.kind not in ("unknown", "insufficient")
         if decided and zero_fault(freed, other) is not None:
             prepared, made, decision = freed, again, other
     if excess is None:
         excess = missed_by(made.best, prepared.problem)
     if excess:
-        say("what no effect explains counts beside the noise")
+        tell("what no effect explains counts beside the noise")
         made = made.with_excess(excess)
         prepared = made.prepared
-        made, decision = _decided(prepared, say, made, pairs)
+        made, decision = _decided(prepared, made, pairs)
     before = prepared.before
     if not decision.effects and prepared.held_out.noise_known:
         decision = _rare(before, made.single, rule) or decision
@@ -526,11 +521,9 @@ def noise_is_all(prepared: Prepared) -> bool:
     return known and not prepared.bench and max(before.z, before.train) <= prepared.rule.quiet
 
 
-def _decided(
-    prepared: Prepared, say: Progress, made: Trials | None, pairs: bool
-) -> tuple[Trials, Decision]:
+def _decided(prepared: Prepared, made: Trials | None, pairs: bool) -> tuple[Trials, Decision]:
     """Return the trials of effects at a damper, and the decision that they lead to."""
-    made, rule = made or Trials(prepared, say), prepared.rule
+    made, rule = made or Trials(prepared), prepared.rule
     if not prepared.held_out.noise_known:
         return made, decide_by_gains(prepared.before, made.single, prepared.held_out, rule)
     organised = rule.organised < 1.0 and bool(made.patterns)

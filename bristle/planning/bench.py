@@ -285,7 +285,7 @@ def _opened(study: Study) -> Prepared:
     """Return the model of a study with its runs."""
     study.usable_effects()
     model, runs = study.model(), study.runs()
-    rig = BenchRuns(runs.train, runs.holdout, model, identified=is_identified(model), say=tell)
+    rig = BenchRuns(runs.train, runs.holdout, model, identified=is_identified(model))
     refuse_lacking(study.folder, rig.lacking)
     opened = rig.prepare(DAMPER)
     refuse_unknown_noise(study.folder, opened.held_out)

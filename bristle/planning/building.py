@@ -225,7 +225,7 @@ def plan_building(
     measured = [*runs.train, *runs.holdout]
     motions = records_at_hand(measured, records, Path.cwd())
     house = BuildingWithFile(building, study.folder / model.building if model.building else None)
-    found = BuildingRuns(runs.train, runs.holdout, model, building, say=tell)
+    found = BuildingRuns(runs.train, runs.holdout, model, building)
     sites = _opened(study, found)
     rig = _within(limits_of_shaking(measured, sites, house), limits or {})
     purposes = purposes_at(sites, requests_of(request, study), rig, study.drive)

@@ -20,7 +20,6 @@ from .history import Step
 from .identify import identify_study, is_identified
 from .learn import learn_effect, learn_study_closure, opened_at, promise_of
 from .steps import (
-    Say,
     add_effects,
     add_unproven,
     diagnose_study,
@@ -93,7 +92,6 @@ def complete(
     proven: bool = False,
     curves: bool = False,
     closure: bool = False,
-    say: Say = tell,
 ) -> Completed:
     """Identify, diagnose and add until the verdict is none, ambiguous, unknown or insufficient.
 
@@ -109,7 +107,6 @@ def complete(
         proves none in the end, those are added that folds of the training runs choose
     curves : whether to go on where the verdict is unknown, by learning a curve
     closure : whether to end with a closure where the verdict leaves an error; the verdict stays
-    say : called with a few words at each stage
     """
     steps: list[Step] = []
     learned: list[LearnedEffect] = []
@@ -120,24 +117,24 @@ def complete(
             steps.append(step)
             keeps(_kept(steps))
 
-    free = _begun_free(study, law_or_all(study, law), say, stepped)
+    free = _begun_free(study, law_or_all(study, law), stepped)
     begun, took, anew, opened = left(), 0.0, False, None
     while True:
-        found = diagnose_study(study, law=ALL if free else study.model().law, say=say)
+        found = diagnose_study(study, law=ALL if free else study.model().law)
         keeps(_kept(steps))
         took = took or begun - left()
         if free:
             found, free = _with_law_taken(study, found, stepped), False
         names = found.effects if found.kind == "effect" else ()
         if found.kind == "unknown" and curves:
-            say("learning a curve")
+            tell("learning a curve")
             learned.append(learn_effect(study))
             names = (learned[-1].name,) if learned[-1].file is not None else ()
         cut = NOT_COMPARED if found.kind == "effect" and left() < 0.0 else ""
         if not names or cut or len(study.model().effects) + len(names) > MOST_EFFECTS:
             done = Completed(found, (), tuple(learned), tuple(gained), cut, anew)
             if _open(found) and not proven and not study.settings.has_building:
-                step, refuted, opened = _gained(study, found, say, stepped)
+                step, refuted, opened = _gained(study, found, stepped)
                 if step is not None:
                     opened = None  # the model is another one
                     gained.append(step)
@@ -148,13 +145,13 @@ def complete(
             lacks_one = _open(found) and not closures(study.model().effects)
             if lacks_one and closure:
                 try:
-                    done = replace(done, closure=_closed(study, found, say, stepped))
+                    done = replace(done, closure=_closed(study, found, stepped))
                 except StudyError as refused:  # the verdict and the steps stand without one
                     done = replace(done, no_closure=str(refused))
             elif lacks_one and not study.settings.has_building:
                 done = replace(done, promise=promise_of(study, opened))
             return replace(done, steps=tuple(steps))
-        say("adding " + " and ".join(names))
+        tell("adding " + " and ".join(names))
         stepped(add_effects(study, names, why=f"verdict: {found.kind}", found=found).step)
 
 
@@ -171,7 +168,7 @@ def halves(step: Step) -> bool:
 
 
 def _gained(
-    study: Study, found: Diagnosis, say: Say, stepped: Callable[[Step | None], None]
+    study: Study, found: Diagnosis, stepped: Callable[[Step | None], None]
 ) -> tuple[Step | None, str, Prepared]:
     """Add what improves the prediction and is not proven.
 
@@ -182,7 +179,7 @@ def _gained(
     if (known.law, known.effects) == (before.law, before.effects):
         fitted = replace(before, values={**before.values, **known.values})
     opened = opened_at(study, "", fitted)[1]
-    say("effects that improve the prediction")
+    tell("effects that improve the prediction")
     laws = found.laws.rows if found.laws is not None and not before.effects else ()
     refuted = ""
     for labels in (True, False):  # a law of a label may fail at a level that no training run had
@@ -192,7 +189,7 @@ def _gained(
         if not names and not best.law:
             return None, " ".join(filter(None, (refuted, cut))), opened
         write_effects(study, best.written)
-        say("adding " + " and ".join([*names, *([best.law] if best.law else [])]))
+        tell("adding " + " and ".join([*names, *([best.law] if best.law else [])]))
         step, why_not = add_unproven(study, best.law, names, best.model.values, found)
         stepped(step)
         refuted = refuted or why_not
@@ -202,13 +199,13 @@ def _gained(
 
 
 def _closed(
-    study: Study, found: Diagnosis, say: Say, stepped: Callable[[Step | None], None]
+    study: Study, found: Diagnosis, stepped: Callable[[Step | None], None]
 ) -> LearnedClosure:
     """Learn a closure and add it where it is kept."""
-    say("learning a closure")
+    tell("learning a closure")
     network = learn_study_closure(study)
     if network.file is not None:
-        say(f"adding {network.name}")
+        tell(f"adding {network.name}")
         why = f"verdict: {found.kind}"
         step = add_effects(study, (network.name,), why=why).step  # beside the present values
         stepped(step)
@@ -230,16 +227,14 @@ def _kept(steps: Sequence[Step]) -> str:
     return f"{made} kept in the study's history: {_ON}"
 
 
-def _begun_free(
-    study: Study, law: str | None, say: Say, stepped: Callable[[Step | None], None]
-) -> bool:
+def _begun_free(study: Study, law: str | None, stepped: Callable[[Step | None], None]) -> bool:
     """Return whether the law is to be sought; identify a model that is to keep it, where needed."""
     other = None if law in (ALL, study.model().law) else law
     stale = bool(other_data(study)) or not is_identified(study.model())
     if law != ALL and (other or stale):
         study.usable_effects()
         compile_ahead()  # all that the verdict needs, while the model is identified
-        say("identifying the model")
+        tell("identifying the model")
         stepped(identify_study(study, law=other).step)
     return law == ALL
 

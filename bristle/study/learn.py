@@ -237,7 +237,7 @@ def _rig(study: Study) -> RigRuns:
     model, runs = study.model(), study.runs()
     return runs_of_rig(
         runs.train, runs.holdout, model, building_of(study, model),
-        identified=is_identified(model), say=tell,
+        identified=is_identified(model),
     )  # fmt: skip
 
 

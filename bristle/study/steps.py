@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
@@ -17,7 +16,7 @@ from ..comparison.predictions import RunPrediction
 from ..comparison.result import Comparison
 from ..core.files import write_whole
 from ..core.interrupt import keeps
-from ..core.progress import tell, telling
+from ..core.progress import tell
 from ..core.text import command, percent, plain, unknown
 from ..data.channels import ChannelSpec
 from ..diagnosis import Diagnosis, diagnose_rig
@@ -57,16 +56,8 @@ from .runs import Runs, refuse_seen, usable
 from .study import Note, Study, note, noted
 from .study_file import ALL, TEST
 
-Say = Callable[[str], None]
 
-
-def diagnose_study(
-    study: Study,
-    *,
-    law: str | None = None,
-    write: bool = True,
-    say: Say = tell,
-) -> Diagnosis:
+def diagnose_study(study: Study, *, law: str | None = None, write: bool = True) -> Diagnosis:
     """Return what the present model of a study is missing; write verdict.json.
 
     A closure is no effect of physics: what it carries is missing still, so the verdict is on the
@@ -78,7 +69,6 @@ def diagnose_study(
     law : "all" seeks the law together with its effects, the model's own keeps it; None seeks it
         where nobody chose one (`laws.law_or_all`)
     write : whether to write verdict.json
-    say : called with a few words at each stage
 
     Raises
     ------
@@ -90,7 +80,7 @@ def diagnose_study(
     """
     law = law_or_all(study, law)
     for why in study.usable_effects():
-        say(f"left out: {why}")
+        tell(f"left out: {why}")
     compile_ahead()
     model, runs = study.model(), study.runs()
     if law not in (None, ALL, model.law):
@@ -104,12 +94,11 @@ def diagnose_study(
     networks = closures(model.effects)
     physics = model.only([one for one in model.effects if one not in networks])
     identified = is_identified(model)
-    with telling(say) if say is not tell else nullcontext():
-        found = diagnose_rig(
-            runs.train, runs.holdout, physics, building_of(study, model), any_law=law == ALL,
-            identified=identified and not networks, named=model.law,
-            kept=LawFits(study, physics) if write and law == ALL else None, say=say,
-        )  # fmt: skip
+    found = diagnose_rig(
+        runs.train, runs.holdout, physics, building_of(study, model), any_law=law == ALL,
+        identified=identified and not networks, named=model.law,
+        kept=LawFits(study, physics) if write and law == ALL else None,
+    )  # fmt: skip
     if identified:
         rig = rig_of(study, model, runs)
         found = replace(found, error=force_errors(site_models(rig, model)))

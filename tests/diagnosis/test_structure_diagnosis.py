@@ -10,6 +10,7 @@ import pytest
 from shaken import building, friction, measured, shake
 
 from bristle.core.finding import Finding
+from bristle.core.progress import telling
 from bristle.diagnosis import diagnose_rig, rig_runs
 from bristle.diagnosis import site as of_damper
 from bristle.diagnosis.conclusion import VerdictContext, conclude, lookalikes
@@ -135,7 +136,8 @@ def test_a_real_effect_is_not_blamed_on_the_load_cell():
 def test_bare_building_diagnosed_from_start_to_end():
     b, runs = runs_of(duffing, damper=None)
     said = []
-    found = diagnose_rig(runs[:2], runs[2:], Model("lugre"), b, say=said.append)
+    with telling(said.append):
+        found = diagnose_rig(runs[:2], runs[2:], Model("lugre"), b)
     assert (found.kind, found.effects) == ("effect", ("duffing",))
     assert found.sites == {"duffing": "layer"}
     assert not found.reconstructed

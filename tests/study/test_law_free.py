@@ -116,7 +116,7 @@ def test_an_error_that_remains_is_lowered_by_what_is_not_proven(
     monkeypatch.setattr(auto, "unproven", chosen)
     monkeypatch.setattr(auto, "add_unproven", add)
     with counted(most):
-        done = complete(folder, say=print)
+        done = complete(folder)
     assert asked == [("opened", found.trials, (), MOST_EFFECTS, True)]
     assert added == [("", ("stribeck", "drift"), found)]
     assert done.steps == done.unproven == (step,)
@@ -146,7 +146,7 @@ def test_where_held_out_runs_refute_a_dependence_on_a_label_the_look_goes_on_wit
     monkeypatch.setattr(auto, "write_effects", lambda _study, _texts: None)
     monkeypatch.setattr(auto, "unproven", chosen)
     monkeypatch.setattr(auto, "add_unproven", add)
-    done = complete(folder, say=print)
+    done = complete(folder)
     assert done.unproven == (step,)
     assert done.refuted == "Not kept: add f_c_by_oil."
 
@@ -166,13 +166,13 @@ def test_what_the_held_out_runs_refute_is_not_kept(bench_study, monkeypatch):
 
 def test_only_what_is_proven_is_added_where_that_is_asked_for(folder, monkeypatch):
     told(monkeypatch, [verdict("unknown", 6.0, ("stribeck", 4.0))])
-    assert complete(folder, proven=True, say=print).steps == ()
+    assert complete(folder, proven=True).steps == ()
     assert folder.names == []
 
 
 def test_what_is_explained_gets_no_further_effect(folder, monkeypatch):
     told(monkeypatch, [verdict("none", 1.0)])
-    done = complete(folder, say=print)
+    done = complete(folder)
     assert not done.unproven
     assert done.promise == 1.0
     assert folder.names == []
@@ -184,7 +184,7 @@ def test_a_named_effect_is_added_unless_enough_was_spent(folder, monkeypatch, mo
     first.effects = ("stribeck",)
     told(monkeypatch, [first, verdict("none", 1.0)])
     with counted(most):
-        done = complete(folder, say=print)
+        done = complete(folder)
     enough = most < 0.0
     assert folder.names == ([] if enough else ["stribeck"])
     assert done.verdict.kind == ("effect" if enough else "none")
@@ -279,7 +279,7 @@ def test_the_pair_of_law_and_effect_is_found(hidden, capsys):
 @pytest.mark.slow  # law free by study auto
 def test_auto_takes_the_law_and_adds_the_effect(hidden):
     study = Study(hidden)
-    done = complete(study, law="all", say=print)
+    done = complete(study, law="all")
     assert (study.model().law, list(study.model().effects)) == ("bingham", ["gas_spring"])
     assert done.verdict.kind == "none"
     assert [step.what for step in done.steps] == ["identify bingham", "add gas_spring"]

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 from bristle.cli import main
+from bristle.core.progress import telling
 from bristle.diagnosis import Diagnosis
 from bristle.errors import RecordError, StudyError
 from bristle.study import steps
@@ -128,8 +129,8 @@ def test_what_was_learnt_before_a_kill_is_kept(study):
         if len(study.steps()) > steps:
             raise Killed
 
-    with pytest.raises(Killed):
-        complete(study, say=killed)
+    with telling(killed), pytest.raises(Killed):
+        complete(study)
     again = Study(study.folder)
     assert list(again.model().effects) == ["gas_spring"]
     assert len(again.steps()) == steps + 1
