@@ -260,10 +260,10 @@ def _value(
     )
     slack = 1e-9 * max(abs(bounds[0]), abs(bounds[1]))
     if low < bounds[0] - slack or high > bounds[1] + slack:
-        allowed = f"{bounds[0]:g} to {bounds[1]:g} {unit}"
+        allowed = f"{bounds[0]:g} to {bounds[1]:g} {unit}".removesuffix(" 1")
         document.error(keys, f"{name}: {low:g} to {high:g} leaves what is physical, {allowed}.")
     if not low <= value <= high:
-        right = f"{low:g} to {high:g} {unit}"
+        right = f"{low:g} to {high:g} {unit}".removesuffix(" 1")
         document.error((*keys, "value"), f"{name} = {value:g} is outside {right}.")
     free = default.free if found["free"] is None else found["free"]
     return Fact(value, unit, low, high, free, found["std"], found["origin"])

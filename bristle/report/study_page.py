@@ -284,7 +284,7 @@ def gather(study: Study, *, open_test: bool = True, what_if: bool = False) -> Co
 
     moved = what_if_section(study) if what_if else ""  # first: it may lack its compiler
     model, steps = study.model(to_show=True), tuple(study.steps())
-    runs = study.runs()
+    verdict, runs = study.verdict(), study.runs()
     now = before = test = damper = None
     trouble, added = "", ""
     found = history_steps(steps)
@@ -301,7 +301,7 @@ def gather(study: Study, *, open_test: bool = True, what_if: bool = False) -> Co
     except BristleError as error:
         trouble = str(error)
     return Content(
-        study, model, study.verdict(), steps, tuple(found), now, before, added, runs.notes, trouble,
+        study, model, verdict, steps, tuple(found), now, before, added, runs.notes, trouble,
         test, moved, damper=damper,
     )  # fmt: skip
 

@@ -573,7 +573,7 @@ def _copies(parts: Sequence[_Part], is_test: Mapping[str, bool]) -> dict[_Part, 
         copies[one] = other
     if len(parts) > 1 and len(first) == 1:
         raise StudyError(
-            f"{parts[0].name} and the other {len(parts) - 1} files hold the same measurement: "
+            f"{listed(one.name for one in parts)} hold the same measurement: "
             "nothing can be held out. Take runs with different motions, or one file alone."
         )
     return copies
