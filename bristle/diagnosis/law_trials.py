@@ -12,7 +12,7 @@ from scipy.stats import t as student
 from ..core.progress import Count
 from ..core.text import percent, short_z
 from ..identification.error import ForceError, force_error
-from ..identification.fit import Search, refine
+from ..identification.fit import Search, refine, with_rest
 from ..identification.problem import Problem, steady, suited, without
 from ..identification.search import in_threads, z_scale
 from ..identification.starts import start_models
@@ -215,6 +215,7 @@ def _fitted(
         return [(law, end.model) for law, end in zip((name, bent), known, strict=False)]
     starts = start_models(train, model, STARTS)
     expected = train.expectation(starts[0])
+    starts = with_rest(train, starts, expected)
     ends = [Search(train, one, expected, one.free()).run(OUTSET) for one in starts]
     best, _ = min(ends, key=lambda end: end[1].cost)
     fitted = [(name, refine(best, train, JACOBIANS))]

@@ -19,6 +19,7 @@ from ..model.model import Model, parameter
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
 from .problem import BLOCK, Expected, Problem, drawn_noise, residuals, steady, without
+from .run_start import remembering_states
 from .search import HUBER_AT_ONE, Descent, descend, in_threads, jacobian, loss, mean_loss
 from .starts import start_models
 
@@ -182,6 +183,10 @@ def _lost(
     return tuple(lost)
 
 
+SEVERAL, FROM_REST = 2, 6
+"""Parts of a damper that remember, from which on searches begin with runs from rest as well; the
+Jacobians of such a search."""
+
 _ALIKE = 1e-3  # relative difference of costs below which two starts have come to the same end
 _FINAL_DRAWS = 24  # draws of the motion for bias and intervals of what is reported
 _ENDS = 6  # searches from beside the best point where the loss is rough
@@ -250,6 +255,25 @@ def _with_intervals(found: Fit, scaled: Search, theta: Array) -> Fit:
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist()
     by_name = dict(zip(scaled.names, std, strict=True))
     return replace(found, std=by_name, unidentified=lost, covariance=covariance)
+
+
+def with_rest(problem: Problem, starts: list[Model], expected: Expected) -> list[Model]:
+    """Return the starts of a law, and where short searches from them come with runs from rest.
+
+    Where several parts of a damper remember what was before a run, its opening tells a mixture of
+    what they hold: a model that is far off gives one of them too much, and a search from there ends
+    in a wrong valley. Only the starts where one part remembers, or no run begins in motion.
+    """
+    states = remembering_states(starts[0].base_law, starts[0].effects)
+    if len(states) < SEVERAL or not any(run.opening for run in problem.runs):
+        return starts
+
+    def searched(start: Model) -> Model:
+        with problem.begun_at_rest():
+            search = Search(problem, start, expected, start.free(), logarithms=False)
+            return search.run(FROM_REST)[0]
+
+    return [*starts, *in_threads(searched, starts)]
 
 
 def multistart_refit(problem: Problem, model: Model, max_evaluations: int = 25) -> Fit:
@@ -337,6 +361,7 @@ def fit_from_starts(problem: Problem, model: Model, starts: int = 4) -> Fit:
     model = without(model, silent)
     trials = start_models(problem, model, starts) if starts else [model]
     expected = problem.expectation(trials[0])
+    trials = with_rest(problem, trials, expected) if starts else trials
     count = Count(f"fitting {law}: start", len(trials))
 
     def searched(start: Model) -> Fit:

@@ -290,6 +290,16 @@ class Fed(NamedTuple):
 _held_starts: ContextVar[dict[int, dict[str, float]] | None] = ContextVar("starts", default=None)
 
 
+@contextmanager
+def _held(starts: dict[int, dict[str, float]]) -> Iterator[None]:
+    """Hold in this context what runs begin with, by their identity."""
+    before = _held_starts.set(starts)
+    try:
+        yield
+    finally:
+        _held_starts.reset(before)
+
+
 @dataclass(frozen=True)
 class Run:
     """A measured run, its motion smoothed.
@@ -604,12 +614,14 @@ class Problem:
         For derivatives by the parameters: where the starts lower the error the most, it changes
         with them no further.
         """
-        starts = {id(run): self.carrying(model, run) for run in runs if run.opening}
-        before = _held_starts.set(starts)
-        try:
+        with _held({id(run): self.carrying(model, run) for run in runs if run.opening}):
             yield
-        finally:
-            _held_starts.reset(before)
+
+    @contextmanager
+    def begun_at_rest(self) -> Iterator[None]:
+        """Let runs that begin in motion begin in this context with nothing held."""
+        with _held({id(run): {} for run in self.runs if run.opening}):
+            yield
 
     def carrying(self, model: Model, run: Run) -> dict[str, float]:
         """Return the start values of the states that carry the force of a run's start, by name.
