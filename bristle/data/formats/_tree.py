@@ -589,6 +589,10 @@ def _for_columns(
             return texts
         if len(texts) == count - 1 and first_rises:
             return ["time" if tells is _TELLS_NAMES else "", *texts]
+        if len(texts) == 2 * count:  # a row or a column of names, then one of units
+            for called, units in ((texts[:count], texts[count:]), (texts[::2], texts[1::2])):
+                if all(unit_or_none(unit) is not None for unit in units):
+                    return [f"{called[k]} [{units[k]}]" for k in range(count)]
         if one in fields:
             found.remarks.append(
                 f"{one} has {len(texts)} texts, and {key} {count} columns: it is not used"

@@ -206,11 +206,11 @@ def _other_times(table: Table, chosen: str) -> str:
     for column in table.columns:
         meant = meaning(column.name, "s")
         alike = _PLAIN_NAME.sub("", column.name) == _PLAIN_NAME.sub("", own.name) or (
-            meant is not None
-            and meant.quantity == "time"
-            and float(np.mean(np.diff(table.values[column.text]) > 0.0)) > 0.98
+            meant is not None and meant.quantity == "time"
         )
         if column.text == chosen or not alike or column.unit != own.unit:
+            continue
+        if float(np.mean(np.diff(table.values[column.text]) > 0.0)) <= 0.98:
             continue
         apart = table.values[column.text] - table.values[chosen]
         step = float(np.nanmedian(np.diff(table.values[chosen])))

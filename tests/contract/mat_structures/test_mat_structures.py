@@ -65,6 +65,7 @@ LABELLED = structures(
     *({"values": column(v), "dimensions": 1.0, "label": f"{n} [{u}]"} for n, v, u in SIGNALS)
 )
 NAMES, UNITS = ([one[k] for one in SIGNALS] for k in (0, 2))
+HEADS = np.array([["time", *NAMES], ["s", *UNITS]], object)
 TABLE = np.column_stack([T, X, U, F])
 
 HELD: dict[str, dict[str, Any]] = {
@@ -111,6 +112,8 @@ HELD: dict[str, dict[str, Any]] = {
     },
     "names of all but the time": {"data": TABLE, "labels": cell(*NAMES), "units": cell(*UNITS)},
     "names in a line": {"data": TABLE, "header": ",".join(["time", *NAMES]), "units": "s,mm,V,N"},
+    "names above units": {"data": TABLE, "header": HEADS},
+    "names beside units": {"data": TABLE, "header": HEADS.T},
     "headers with units": {
         "A": {"data": TABLE, "colheaders": cell("t [s]", "x [mm]", "u [V]", "F [N]")},
     },
@@ -201,8 +204,10 @@ def test_an_array_of_runs_of_version_7_3(tmp_path: Path) -> None:
 
 def test_a_list_of_names_that_does_not_fit_is_said(tmp_path: Path) -> None:
     savemat(tmp_path / "run.mat", {"data": TABLE, "names": cell("a", "b")})
-    remarks = read_table(tmp_path / "run.mat").remarks
-    assert remarks == ("names has 2 texts, and data 4 columns: it is not used",)
+    table = read_table(tmp_path / "run.mat")
+    assert table.remarks == ("names has 2 texts, and data 4 columns: it is not used",)
+    (time,) = guess_channels(table)
+    assert time.doubt == "no unit is given, s is assumed: 500 Hz"
 
 
 @pytest.mark.parametrize(
