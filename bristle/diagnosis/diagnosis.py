@@ -125,9 +125,7 @@ def _with_patterns(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
     patterns = list(found.patterns) or patterns_of(prepared.before, prepared.held_out)
     if found.kind != "unknown":
         return replace(found, patterns=tuple(patterns))
-    coordinate, patterns, beside = remaining_residual(
-        prepared.before, found.trials, patterns, prepared.held_out, prepared.rule
-    )
+    coordinate, patterns, beside = remaining_residual(prepared, found.trials, patterns)
     return replace(found, coordinate=coordinate, patterns=tuple(patterns), beside=beside)
 
 

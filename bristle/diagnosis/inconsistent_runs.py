@@ -246,32 +246,39 @@ def contradicted(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
     # Whether noise is all that a model leaves of some of the runs.
     prepared = prepared.with_excess(0.0)
     with counted(MOST_SPENT):
-        for apart in (_but_for_a_run, _but_for_clocks):
-            odd = apart(found, prepared)
-            if odd is not found:
-                return odd
+        for train, apart in (
+            (prepared.searched, _but_for_a_run), (prepared.problem, _but_for_clocks),
+        ):  # fmt: skip
+            runs = train, prepared.held_out
+            for trial, added in _to_be_explained(found, prepared):
+                if added and not _affordable(trial.model, runs):
+                    break
+                if text := apart(trial, added, runs, prepared.rule):
+                    return _with_reason(found, trial, text)
     before, rule, at_damper = prepared.before, prepared.rule, found.site == DAMPER
     kind = kind_of(found.kind, before, found.after, rule)
-    runs = prepared.searched, prepared.held_out, rule
+    of_runs = prepared.searched, prepared.held_out, rule
     if found.kind == kind == "unknown":
-        text = groups(before.model, *runs, prepared.bench)
+        text = groups(before.model, *of_runs, prepared.bench)
         return replace(found, kind="insufficient", reasons=(text,)) if text else found
     if found.kind == "unknown":
         differ = HELD_OUT_DIFFER.format(force=force_in(prepared.held_out, found.site))
-        worst = inconsistent_runs(before.model, *runs, at_damper)
+        worst = inconsistent_runs(before.model, *of_runs, at_damper)
         text = " ".join(filter(None, [*found.reasons, differ, worst]))
         return replace(found, kind=kind, reasons=(text,))
     if kind == found.kind:
         return found
     best = found.after.model
-    if at_damper and (text := small_zeros(best, (prepared.problem, runs[1]), rule)):
+    if at_damper and (text := small_zeros(best, (prepared.problem, prepared.held_out), rule)):
         return replace(found, reasons=(*found.reasons, text))
-    text = inconsistent_runs(best, prepared.problem, *runs[1:], at_damper)
+    text = inconsistent_runs(best, prepared.problem, *of_runs[1:], at_damper)
     return replace(found, kind=kind, reasons=(text,))
 
 
-def _but_for_a_run(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
-    """Return a finding that names the run whose zero or gain is another one, if there is one.
+def _but_for_a_run(
+    trial: Trial, added: Sequence[str], runs: tuple[Problem, Problem], rule: DecisionRule
+) -> str:
+    """Return, in words, the run whose zero or gain is another one, "" where there is none.
 
     Where a model explains all other runs, what they leave together is no other form of an effect,
     and no further effect. If that model has fewer effects than the finding's, the run is to be set
@@ -279,39 +286,27 @@ def _but_for_a_run(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
 
     Parameters
     ----------
-    found, prepared : as in `contradicted`
+    trial, added : of `_to_be_explained`
+    runs : to fit to, and those that decide
+    rule : the numbers that decide
     """
-    runs = prepared.searched, prepared.held_out
-    for trial, added in _to_be_explained(found, prepared):
-        if added and not _affordable(trial.model, runs):
-            break
-        called = f"The model with {' and '.join(added)}" if added else "One model"
-        text = odd_run(trial.model, *runs, prepared.rule, called)
-        if text:
-            return _with_reason(found, trial, text)
-    return found
+    called = f"The model with {' and '.join(added)}" if added else "One model"
+    return odd_run(trial.model, *runs, rule, called)
 
 
-def _but_for_clocks(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
-    """Return a finding that names the runs whose loggers began apart, if that explains the rest.
+def _but_for_clocks(
+    trial: Trial, added: Sequence[str], runs: tuple[Problem, Problem], _: DecisionRule
+) -> str:
+    """Return, in words, the runs whose loggers began apart, "" if that does not explain the rest.
 
     Beside a missing effect it shows only in what the effect leaves: clocks are looked at for the
-    present model before.
-
-    Parameters
-    ----------
-    found, prepared : as in `_but_for_a_run`
+    present model before. Takes what `_but_for_a_run` takes.
     """
-    runs = prepared.problem, prepared.held_out
-    for trial, added in _to_be_explained(found, prepared):
-        if added and not _affordable(trial.model, runs):
-            break
-        clocks = clock_faults(trial, *runs) if added else None
-        if clocks is not None:
-            text = " ".join(fault.text for fault in clocks.faults)
-            where = f"Told from {force_in(prepared.problem)}."
-            return _with_reason(found, trial, f"With {' and '.join(added)}: {text} {where}")
-    return found
+    clocks = clock_faults(trial, *runs) if added else None
+    if clocks is None:
+        return ""
+    text = " ".join(fault.text for fault in clocks.faults)
+    return f"With {' and '.join(added)}: {text} Told from {force_in(runs[0])}."
 
 
 def _affordable(model: Model, runs: tuple[Problem, Problem]) -> bool:
@@ -383,22 +378,17 @@ def inconsistent_runs(
     str
         "" where the model explains all runs.
     """
-    z = {
-        run.name: robust_z(problem.of([run]), model)
-        for problem in (train, held_out)
-        for run in problem.runs
-    }
+    ones = {run.name: some.of([run]) for some in (train, held_out) for run in some.runs}
+    z = {name: robust_z(one, model) for name, one in ones.items()}
     bad = [name for name, size in z.items() if size > rule.misfit]
     good = [name for name in z if name not in bad]
     if not bad:
         return ""
-    count = {run.name: len(run.force) for one in (train, held_out) for run in one.runs}
+    count = {name: len(ones[name].runs[0].force) for name in bad}
     worst = ", ".join(f"{name} ({z[name]:.3g}, {count[name]:,} samples)" for name in bad)
     shifted = [
-        other_zero(model, problem.of([run]), rule) or other_gain(model, problem.of([run]), rule)
-        for problem in (train, held_out)
-        for run in problem.runs
-        if zeros and run.name in bad
+        other_zero(model, ones[name], rule) or other_gain(model, ones[name], rule)
+        for name in (bad if zeros else ())
     ]
     return " ".join([
         f"One model does not explain the force of all runs: its error over the "

@@ -16,8 +16,7 @@ from ..identification.fit import Search, refine, with_rest
 from ..identification.problem import Problem, steady, suited, without
 from ..identification.search import in_threads, z_scale
 from ..identification.starts import start_models
-from ..model.model import Model
-from ..physics.effect import EFFECTS
+from ..model.model import Model, unfit
 from ..physics.forms import LINEAR_FORM, QUADRATIC_FORM, choosable, joined_form, split_form
 from ..physics.laws import base_and_variant, law_names
 from .decision import NOISE
@@ -233,7 +232,8 @@ def _fitted(
 def _model(name: str, problem: Problem, present: Model) -> Model:
     """Return a law with the present effects that can join it, where its fit begins."""
     base, variant = base_and_variant(name)
-    effects = tuple(one for one in present.effects if _joins(one, base.name))
+    lost = unfit(base, present.effects)
+    effects = tuple(one for one in present.effects if one not in lost)
     own = {name for name in present.values if name.partition(".")[0] in effects}
     values = problem.at_size(base.name, effects) | {name: present.values[name] for name in own}
     kept = {n for n in (*present.fixed, *present.limits) if n.partition(".")[0] in effects}
@@ -243,12 +243,6 @@ def _model(name: str, problem: Problem, present: Model) -> Model:
         {n: pair for n, pair in present.limits.items() if n in kept},
     )  # fmt: skip
     return without(model, base.driven()) if steady(problem) else model
-
-
-def _joins(effect: str, law: str) -> bool:
-    """Return whether an effect acts elsewhere than in the damper, or can join its law."""
-    known = EFFECTS[effect]
-    return "damper" not in known.sites or known.joins(base_and_variant(law)[0])
 
 
 def _row(law: str, model: Model, train: Problem, held_out: Problem) -> LawTrial:

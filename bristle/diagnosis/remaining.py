@@ -13,6 +13,7 @@ from ..core.arrays import Array
 from ..identification.building_sites import StructureRun
 from ..identification.problem import Problem, Run
 from .decision import missing
+from .prepared import Prepared
 from .rule import BENCH, DecisionRule
 from .trials import Trial
 
@@ -44,11 +45,7 @@ def late_speed_of(run: Run) -> Array:
 
 
 def remaining_residual(
-    before: Trial,
-    trials: Sequence[Trial],
-    rest: list[ResidualPattern],
-    held_out: Problem,
-    rule: DecisionRule = BENCH,
+    prepared: Prepared, trials: Sequence[Trial], rest: list[ResidualPattern]
 ) -> tuple[str, list[ResidualPattern], tuple[str, ...]]:
     """Return the coordinate that organises what no effect explains, all patterns, and beside what.
 
@@ -57,11 +54,9 @@ def remaining_residual(
 
     Parameters
     ----------
-    before : the trial of the model without a further effect
+    prepared : the site's runs and its model
     trials : those of single effects, any order
-    rest : patterns of the residual of `before`, the most telling first
-    held_out : runs that decide
-    rule : the numbers that decide
+    rest : patterns of the residual of the model, the most telling first
 
     Returns
     -------
@@ -69,6 +64,7 @@ def remaining_residual(
         Name of the coordinate ("" where there is no pattern), the patterns it was chosen from, and
         the nearest effect where they are of the model with it.
     """
+    before, held_out, rule = prepared.before, prepared.held_out, prepared.rule
     nearest = min(trials, key=lambda trial: trial.z, default=before)
     if _clear(rest, rule) or not missing(before, nearest, rule):
         return most_telling(rest, before, held_out, rule), rest, ()

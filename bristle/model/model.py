@@ -549,6 +549,11 @@ class Model:
         return replace(self, drive=drive, facts=facts)
 
 
+def unfit(law: type[Law], effects: Sequence[str]) -> list[str]:
+    """Return the effects that act where a law does and cannot join it."""
+    return [n for n in effects if law.site in EFFECTS[n].sites and not EFFECTS[n].joins(law)]
+
+
 def _site_of(name: str, bench: bool) -> str:
     effect = EFFECTS[name]
     return "damper" if bench and "damper" in effect.sites else effect.site

@@ -23,11 +23,10 @@ from ..diagnosis.trials import BESIDE, End, Trial
 from ..diagnosis.words import left_out
 from ..errors import BristleError, PhysicsError, StudyError
 from ..identification.rig import DAMPER, Rig
-from ..model.model import Model
+from ..model.model import Model, unfit
 from ..model.model_file import model_text
 from ..physics.command import MOST_KNOTS
 from ..physics.drive import DRIVES
-from ..physics.effect import EFFECTS
 from ..physics.forms import FORMS, LINEAR_FORM, TABLE_FORM, joined_form, split_form
 from ..physics.laws import DEFAULT, base_and_variant
 from ..version import __version__
@@ -161,10 +160,9 @@ def in_form(model: Model, form: str, runs: Sequence[Measurement]) -> Model:
         law, _ = base_and_variant(name)
     except PhysicsError as error:
         raise StudyError(str(error)) from None
-    unfit = [n for n in model.effects if law.site in EFFECTS[n].sites and not EFFECTS[n].joins(law)]
-    if unfit:
+    if wrong := unfit(law, model.effects):
         raise StudyError(
-            f"{', '.join(unfit)} bends the command already, and a {form} would do so once more: "
+            f"{', '.join(wrong)} bends the command already, and a {form} would do so once more: "
             "undo that step first."
         )
     return _carried(model, model.with_law(name, model.effects))
@@ -364,13 +362,8 @@ def with_law(model: Model, law: str) -> Model:
     PhysicsError
         If there is no such law.
     """
-    base, _ = base_and_variant(law)
-    able = [
-        name
-        for name in model.effects
-        if base.site not in EFFECTS[name].sites or EFFECTS[name].joins(base)
-    ]
-    return model.with_law(law, able)
+    lost = unfit(base_and_variant(law)[0], model.effects)
+    return model.with_law(law, [name for name in model.effects if name not in lost])
 
 
 def law_command(folder: object, law: str, *others: str) -> str:
