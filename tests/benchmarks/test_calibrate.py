@@ -90,8 +90,8 @@ def test_every_field_that_a_decision_reads_is_varied() -> None:
     read = fields_read(decision, damper.is_organised, inconsistent_runs.kind_of)
     read -= {"part"}  # it decides where the noise is not known; of the cases it always is
     assert read | {"least_excess"} == set(varied.BENCH_VALUES)
-    site = (damper.decide_site, damper.lowers, damper.better, damper.equals, damper._rivals)
-    read = fields_read(*site, inconsistent_runs.kind_of)
+    own = (damper.decide_site, damper.lowers, damper.better, damper.equals, damper._rivals)
+    read = fields_read(*own, decision.named, inconsistent_runs.kind_of)
     assert read | {"least_excess"} == set(varied.SITE_VALUES)
 
 
