@@ -95,7 +95,7 @@ def _read(study: Study, said: dict[str, object], rig: _odd_devices.Rig) -> Answe
         one.after["error_share_holdout"] for one in steps if "error_share_holdout" in one.after
     ]
     closed = said.get("closure")
-    kept = isinstance(closed, dict) and bool(closed.get("file"))
+    kept = isinstance(closed, dict) and bool(closed.get("kept"))
     labels = {
         label
         for name in model.effects if not (kept and name == model.effects[-1])

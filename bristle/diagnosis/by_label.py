@@ -50,6 +50,9 @@ labels and parameters looked at. A model that misses much says little of each ru
 WORTH = 0.04
 """Smallest share of the training runs' loss that is worth a trial: z falls by half of it."""
 
+CLEARER = 0.97
+"""Share of the loss that one parameter leaves, which a factor of the whole force leaves at most."""
+
 BENT = 0.01
 """Largest probability that a straight line over the label explains the runs, for steps to do."""
 
@@ -150,6 +153,8 @@ class RunwiseFit:
         b[p:] = self._right[:, j] @ columns
         without, all_of = _solved(A[:p, :p], b[:p]), _solved(A, b)
         share = float(b @ all_of - b[:p] @ without) / max(self._loss, 1e-300)
+        if self.names[j] == WHOLE:  # one parameter, where it does as well, says more
+            share = 1.0 - (1.0 - share) / CLEARER
         return share, self.scale[j] * all_of[p:]
 
 
@@ -236,6 +241,7 @@ def dependences(prepared: Prepared, *, with_motion: bool = False) -> list[Depend
             if (one := _dependence(fits, j, label, train, model, BENT * looked / LIKELY))
         ]
         own.sort(key=lambda one: -one.gain)
+        own = [one for one in own if one is own[0] or one.name != _called(WHOLE, label)]
         own = [one for one in own[:2] if one.gain >= 0.5 * own[0].gain]
         found += [one for one in own if _beside(one, label, train, runs, model) <= looked]
     return sorted(found, key=lambda one: -one.gain)[:MOST]
