@@ -15,7 +15,7 @@ from bristle.cli import main
 from bristle.data.channels import channel_unit
 
 HOUSE = building(1)
-BEGIN, SAMPLES = 1000, 4000  # what is cut off is the rest before the shaking
+BEGIN, SAMPLES = 1000, 2500  # what is cut off is the rest before the shaking
 CORNER, RATE = 60.0, 500.0  # Hz, of the filter and of the logger
 
 

@@ -17,7 +17,7 @@ from scipy.signal import butter, sosfiltfilt
 from bristle.cli import main
 from bristle.study.study import Study
 
-RATE, OVER, SECONDS = 500.0, 4, 8.0  # the logger's; the recorder filters before it
+RATE, OVER, SECONDS = 500.0, 4, 5.0  # the logger's; the recorder filters before it
 CORNER = 60.0  # Hz, of the recorder's filter
 MOTIONS = ((12e-3, 1.3), (20e-3, 0.9), (15e-3, 1.7))
 HARD = 2.9e6  # N/m3
