@@ -36,6 +36,6 @@ def test_threads_run_fmus_of_one_name_side_by_side() -> None:
         return float(frame["damper.force"].abs().max())
 
     with ThreadPoolExecutor(3) as pool:
-        peaks = list(pool.map(peak, [1, 2, 3] * 4))
-    assert peaks == peaks[:3] * 4
+        peaks = list(pool.map(peak, [1, 2, 3] * 2))
+    assert peaks == peaks[:3] * 2
     assert peaks[0] < peaks[1] < peaks[2]
