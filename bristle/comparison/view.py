@@ -6,7 +6,6 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from matplotlib.collections import PolyCollection
 
 from ..core.arrays import Array
 from ..core.text import log_ticks, percent, plain, quantity, scale, short_z
@@ -676,6 +675,8 @@ def draw_cycle(
     over : name of the coordinate
     force : factor from SI and unit in which the output is shown
     """
+    from matplotlib.collections import PolyCollection
+
     of, (factor, _) = one.prediction, force
     x = SHOWN.get(over, (1.0, ""))[0] * of.coordinates[over][one.part]
     predicted = factor * of.predicted[one.part]

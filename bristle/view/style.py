@@ -7,10 +7,9 @@ import textwrap
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-from matplotlib.figure import Figure
 
 from ..core.files import writing
 from ..core.text import short_z as short_z
@@ -18,6 +17,7 @@ from ..errors import not_usable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from matplotlib.gridspec import GridSpec
 
 
@@ -119,7 +119,7 @@ class Page:
         foot = _broken(note, width, 17.0)
         self.foot = MARGIN + (0.13 * (foot.count("\n") + 1) if foot else 0.0)
         self.width, self.height = width, height + self.head + self.foot
-        self.figure: Figure = Picture(figsize=(self.width, self.height))
+        self.figure: Figure = _pictures()(figsize=(self.width, self.height))
         top = self.height - MARGIN * 0.7
         for text, font, line in parts:
             if text:
@@ -247,8 +247,15 @@ DPI = 110
 """Dots per inch of what a notebook shows."""
 
 
-class Picture(Figure):
-    """A figure outside of pyplot: no window opens, and nothing keeps it but its owner."""
+@cache
+def _pictures() -> type[Figure]:
+    """Return the class of all figures; what draws none does not import matplotlib."""
+    from matplotlib.figure import Figure
 
-    def _repr_png_(self) -> bytes:
-        return png(self, DPI)
+    class Picture(Figure):
+        """A figure outside of pyplot: no window opens, and nothing keeps it but its owner."""
+
+        def _repr_png_(self) -> bytes:
+            return png(self, DPI)
+
+    return Picture
