@@ -153,7 +153,7 @@ class _CompileEvents(event.Listener):  # type: ignore[misc]
     """Tells that numba compiles, which may take a minute; what it finds on disk it only reads."""
 
     def on_start(self, event: Any) -> None:
-        tell("compiling the laws, once")
+        tell("compiling, once")
 
     def on_end(self, event: Any) -> None:
         pass

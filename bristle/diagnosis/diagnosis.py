@@ -13,7 +13,7 @@ from ..data.channels import Labels, varying
 from ..data.measurement import Measurement
 from ..errors import RecordError
 from ..identification.fit import intervals_of, is_rough, multistart_refit
-from ..identification.histories import counted
+from ..identification.histories import counted, left
 from ..identification.problem import Run
 from ..identification.rig import DAMPER
 from ..model.model import Model
@@ -51,15 +51,18 @@ NOT_THE_LAW = "No other law leaves a smaller error: it is not the form of the la
 # organised, how well parameters are known, and which run would distinguish alternatives.
 
 
-def with_evidence(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
+def with_evidence(found: SiteDiagnosis, prepared: Prepared, adds: int = 0) -> SiteDiagnosis:
     """Return a site's finding with limits, patterns, intervals and, where asked for, a next run.
 
     Parameters
     ----------
     found : what the site lacks
     prepared : its runs and its model
+    adds : how many effects that a finding names join the model at once: a finding on that model
+        follows, and this one is told without limits
     """
-    found = _with_limits(found, prepared)
+    if not (found.kind == "effect" and len(found.effects) <= adds and left() >= 0.0):
+        found = _with_limits(found, prepared)
     found = _with_intervals(_with_patterns(found, prepared), prepared)
     return _with_labels(found, prepared)
 
@@ -168,6 +171,7 @@ def diagnose_rig(
     any_law: bool = False,
     named: str = "",
     kept: KeptFits | None = None,
+    adds: int = 0,
 ) -> Diagnosis:
     """Return what a rig's model is missing, and at which of its sites.
 
@@ -183,6 +187,7 @@ def diagnose_rig(
         effects that can join them
     named : the present law with its variant, "" where nobody chose one
     kept : fits of laws that are known already, and where those that are made go
+    adds : of the damper's finding on a bench, as in `with_evidence`
 
     Raises
     ------
@@ -212,7 +217,7 @@ def diagnose_rig(
     tell(f"verdict {law}{found.briefly}")
     if laws is None and prepared.bench:
         found = _beside_other_laws(found, prepared, runs.bends)
-    findings[DAMPER] = with_evidence(found, prepared)
+    findings[DAMPER] = with_evidence(found, prepared, adds if prepared.bench else 0)
     return replace(conclude(findings, runs.context(prepared)), laws=laws)
 
 

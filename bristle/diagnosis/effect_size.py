@@ -29,6 +29,9 @@ KEPT = 8
 FEW = 4
 """Draws of the motion's error from which the noise on the runs that decide is taken."""
 
+IN_PROPORTION = 1e-6
+"""What a change may be off, of its largest, to be in proportion to the size."""
+
 REFITS = 10
 """Steps of a robust fit of the model's own parameters, at most."""
 
@@ -209,6 +212,8 @@ class Sized:
         self.signed = self.low < 0.0 and not self.falls
         self._without = self._counted(self.without())
         self._changes: dict[float, Array] = {}
+        self._first: tuple[float, Array] | None = None
+        self._straight = (0.0, 0.0)
 
     @property
     def unit(self) -> str:
@@ -230,8 +235,26 @@ class Sized:
         if value not in self._changes:
             if len(self._changes) == KEPT:
                 del self._changes[next(iter(self._changes))]
-            self._changes[value] = self._counted(self.with_value(value)) - self._without
+            self._changes[value] = self._changed(value)
         return self._changes[value]
+
+    def _changed(self, value: float) -> Array:
+        """Return the change (n,) at a value of the parameter [SI].
+
+        Between none and values at which it was found in proportion to the first, it is.
+        """
+        low, high = self._straight
+        if self._first is not None and low <= value <= high:
+            return self._first[1] * (value / self._first[0])
+        found: Array = self._counted(self.with_value(value)) - self._without
+        if self._first is None:
+            self._first = value, found
+        elif self._first is not None:
+            off = found - self._first[1] * (value / self._first[0])
+            if np.abs(off).max() <= IN_PROPORTION * np.abs(found).max():
+                known = self._first[0], value
+                self._straight = min(low, *known), max(high, *known)
+        return found
 
     def change_there(self, size: float) -> Array:
         """Return what is left (n,) of the effect on the runs that decide, the model refitted.

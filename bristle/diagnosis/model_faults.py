@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from operator import is_
 
 import numpy as np
 
@@ -133,9 +134,13 @@ def _zero_of_force(before: Trial, train: Problem, held_out: Problem) -> ModelBas
     carrier = _carrier(before.model.base_law)
     if carrier is None or train.free_zero or has_offset(before.model):
         return None  # it is known, or an offset of its own would be that one
-    base = before.model
+    base, expected = before.model, train.expectation(before.model)
     offset = float(np.median(_left(base, train)))
-    if promise(_loss(base, _shifted(train, offset)), _loss(base, train)) < DRIVE.promise:
+    costs = (
+        mean_loss(losses(residuals(one, base, expected)))
+        for one in (_shifted(train, offset), train)
+    )
+    if promise(*costs) < DRIVE.promise:
         return None
     own = f"{carrier.name}.{carrier.offset}"
     others = tuple(f"{carrier.name}.{n}" for n in carrier.parameters if n != carrier.offset)
@@ -311,7 +316,8 @@ def limited_drive(before: Trial, train: Problem, held_out: Problem) -> ModelBase
     """
     if before.z < 1.0 + LIMITED.gain or not _moving(train):
         return None
-    coarse = train.of([run.coarser(COARSE) for run in train.runs])
+    runs = [run.coarser(COARSE) for run in train.runs]
+    coarse = train if all(map(is_, runs, train.runs)) else train.of(runs)
     expected = coarse.expectation(before.model)
     at_first = mean_loss(loss(residuals(coarse, before.model, expected)))
     looked = [_looked_at(kind, before.model, coarse, expected) for kind in LIMITS]
@@ -371,17 +377,28 @@ def _of_run(run: Run, fault: str, value: float, draws: bool) -> Run:
 
 
 def _looked_at(kind: str, model: Model, train: Problem, expected: Expected) -> _Limit | None:
-    """Return the best of a kind's limits, by a linear step of the law beside each."""
+    """Return the best of a kind's limits, by a linear step of the law beside each.
+
+    That with the law's sensitivities as they are without a limit tells which, that with its own how
+    good it is.
+    """
+    J = Search(train, model, expected, model.free()).sensitivities()
     best = None
     for value in _nodes(kind, train).tolist():
         limit = _Limit(kind, value, model, np.inf)
         search = Search(_felt(train, limit, draws=False), model, expected, model.free())
-        here, J = search.residuals(search.start), search.sensitivities()
-        theta = np.clip(search.start - linear_step(J, here), search.low, search.high)
-        cost = mean_loss(loss(here + J @ (theta - search.start)))
-        if best is None or cost < best.cost:
-            best = replace(limit, model=search.at(theta), cost=cost)
-    return best
+        found = _stepped(limit, search, J)
+        if best is None or found.cost < best[0].cost:
+            best = found, limit, search
+    return None if best is None else _stepped(*best[1:], best[2].sensitivities())
+
+
+def _stepped(limit: _Limit, search: Search, J: Array) -> _Limit:
+    """Return a limit with the law after a linear step by sensitivities (n, p)."""
+    here = search.residuals(search.start)
+    theta = np.clip(search.start - linear_step(J, here), search.low, search.high)
+    cost = mean_loss(loss(here + J @ (theta - search.start)))
+    return replace(limit, model=search.at(theta), cost=cost)
 
 
 def _fitted(limit: _Limit, train: Problem, expected: Expected) -> _Limit:

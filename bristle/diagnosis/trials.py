@@ -33,6 +33,7 @@ from ..identification.search import (
 )
 from ..identification.start_grid import (
     Candidate,
+    Scored,
     ScreeningData,
     SearchContext,
     ranked_guesses,
@@ -205,18 +206,16 @@ def joinable(
 
 def guesses_of(names: Sequence[str], context: SearchContext) -> dict[str, list[Candidate]]:
     """Return the starts of effects, the best first, looked at the more the better they score."""
-    scores = dict(
-        zip(names, in_threads(lambda name: scored_guesses(name, context), names), strict=True)
-    )
-    ranked = sorted((score for score, _ in scores.values()), reverse=True)
+    found = in_threads(lambda name: scored_guesses(name, context), names)
+    scores = dict(zip(names, found, strict=True))
+    ranked = sorted((one.score for one in found), reverse=True)
     least = min(SCORED * ranked[0], ranked[min(ABLE, len(ranked)) - 1]) if ranked else 0.0
     least = max(least, SCORED * (1.0 - (1.0 - BENCH.gain) ** 2))
 
     def look(name: str) -> list[Candidate]:
-        score, starts = scores[name]
-        if score < least:
-            return ranked_guesses(name, context, starts[:1])
-        return screened(name, context, starts)
+        if scores[name].score < least:
+            return ranked_guesses(name, context, scores[name], 1)
+        return screened(name, context, scores[name])
 
     return dict(zip(names, in_threads(look, names), strict=True))
 
@@ -231,25 +230,27 @@ def promised(first: Trial, train: Problem, shown: Sequence[str]) -> float:
     """
     context = SearchContext(first.model, train)
     names = joinable(first.model, shown, train)
-    scores = in_threads(lambda name: scored_guesses(name, context)[0], names)
+    scores = in_threads(lambda name: scored_guesses(name, context).score, names)
     return first.z * sqrt(max(0.0, 1.0 - max(scores, default=0.0)))
 
 
-def screened(effect: str, context: SearchContext, starts: Sequence[Model]) -> list[Candidate]:
+def screened(effect: str, context: SearchContext, scored: Scored) -> list[Candidate]:
     """Return the starts of an effect; a very short search has begun at the best, which is first.
 
     One step is not enough where the present model's parameters hold each other: a fall with speed
     that went to its bound moves only together with what is to take its place.
     """
-    first, *others = ranked_guesses(effect, context, starts)
+    first, *others = ranked_guesses(effect, context, scored)
     return [_searched(first, context.screening(effect), SCREENING), *others]
 
 
 def _searched(start: Candidate, data: ScreeningData, sweeps: int) -> Candidate:
-    """Return where a search from a start comes to."""
+    """Return where a search from a start comes to: no further where one has ended there."""
+    if start.settled:
+        return start
     search = Search(data.problem, start.model, data.expected, start.model.free())
     model, ended = search.run(sweeps)
-    return Candidate(model, ended.cost)
+    return Candidate(model, ended.cost, settled=ended.sweeps < sweeps)
 
 
 def short_search(

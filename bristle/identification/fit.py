@@ -29,8 +29,9 @@ from .starts import start_models
 MOST_TURNS = 5
 """How often a rough search begins again at most."""
 
-PAYS = 0.95
-"""What the loss must fall to, as a share, for another turn."""
+PAYS, STAYS = 0.95, 0.999
+"""What the loss must fall to, as a share, for another turn of a rough search, and for the second
+one of another: a model that stays where it was has the noise that was drawn for it."""
 
 
 def is_rough(model: Model) -> bool:
@@ -108,7 +109,8 @@ def refine(start: Model, train: Problem, sweeps: int = 12) -> Model:
     for turn in range(MOST_TURNS):
         search = Search(train, model, train.expectation(model), model.free())
         model, ended = search.run(max(3, sweeps // 2) if turn == 0 else sweeps)
-        if turn and not (search.rough and ended.cost < PAYS * cost):
+        last = ended.cost >= PAYS * cost if search.rough else ended.cost >= STAYS * ended.begun
+        if last or (turn and not search.rough):
             break
         cost = ended.cost
     return model

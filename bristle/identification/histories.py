@@ -58,6 +58,7 @@ class Ahead:
     """
 
     def __init__(self, name: str, digest: str) -> None:
+        self._what = "effects" if name == force_history.__name__ else "laws"
         self._done = False
         self._lock = Lock()
         folder = str(Path(__file__).resolve().parents[2])
@@ -79,7 +80,7 @@ class Ahead:
         with self._lock:
             if self._done:
                 return
-            tell("compiling the laws, once")
+            tell(f"compiling the {self._what}, once")
             assert self._process.stdout is not None
             self._process.stdout.readline()  # empty where it has ended: whoever asks compiles then
             self._process.stdout.close()

@@ -269,6 +269,10 @@ REFERENCE = {
 """Typical sizes on the rig of 10 N for which the effects' defaults are written."""
 
 
+KEPT = 4_000_000
+"""Numbers drawn of a model's noise that are kept, for models that are asked for again."""
+
+
 class Moments(NamedTuple):
     """Motion and command x, v, a, V (m,) in SI at moments that are `dt` [s] apart."""
 
@@ -449,6 +453,7 @@ class Problem:
     def __init__(self, runs: list[Run]) -> None:
         self.runs = runs
         self._benches: dict[tuple[Any, ...], DamperForces] = {}
+        self._drawn: dict[tuple[Any, ...], Expected] = {}
         self._sizes: dict[str, float] = {}
 
     @property
@@ -588,8 +593,7 @@ class Problem:
 
     def bench(self, model: Model) -> DamperForces:
         """Return what predicts a model's force, made once."""
-        # By their classes: another effect may have the name of one that was learned before.
-        key = (LAWS[model.base_law], *(EFFECTS.get(name, name) for name in model.effects))
+        key = _kind(model)
         if key not in self._benches:
             self._benches[key] = DamperForces(model.base_law, list(model.effects))
         return self._benches[key]
@@ -689,7 +693,15 @@ class Problem:
         `excess` if there is any; `draws` are the motion's part alone. Samples that were not
         measured get a noise of `LOST`.
         """
-        return [self._expected(model, run, draws) for run in self.runs]
+        key = (*_kind(model), model.law, draws, *sorted(model.values.items()))
+        if (found := self._drawn.get(key)) is None:
+            found = [self._expected(model, run, draws) for run in self.runs]
+            size = draws * sum(len(run.force) for run in self.runs)
+            if len(self._drawn) >= KEPT // max(size, 1):
+                self._drawn.clear()
+            if size <= KEPT:
+                self._drawn[key] = found
+        return found
 
     @np.errstate(over="ignore", invalid="ignore")  # of a force that is not finite nothing is
     def _expected(self, model: Model, run: Run, draws: int) -> tuple[Array, Array, Array]:
@@ -710,6 +722,14 @@ class Problem:
         if run.measured is not None:
             noise = np.where(run.measured, noise, LOST * noise)
         return bias, noise, spread - bias
+
+
+def _kind(model: Model) -> tuple[Any, ...]:
+    """Return law and effects of a model by their classes.
+
+    Another effect may have the name of one that was learned before.
+    """
+    return (LAWS[model.base_law], *(EFFECTS.get(name, name) for name in model.effects))
 
 
 def sizes(runs: list[Run]) -> dict[str, float]:

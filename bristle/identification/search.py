@@ -49,11 +49,12 @@ _SPIKE = 5.0
 class Descent:
     """Where a search ended.
 
-    `theta` (p,); `cost` the mean robust loss per residual; `normal` (p, p) the matrix J'WJ there;
-    `sweeps` how many steps were taken.
+    `theta` (p,); `begun`, `cost` the mean robust loss per residual at the start and there; `normal`
+    (p, p) the matrix J'WJ there; `sweeps` how many steps were taken.
     """
 
     theta: Array
+    begun: float
     cost: float
     normal: Array
     sweeps: int
@@ -139,9 +140,9 @@ def descend(
     r = residuals(theta)
     judged = max(1, int(np.count_nonzero(r)))
     slopes = slopes or (lambda theta, r: jacobian(residuals, theta, r, low, high))
-    cost = float(np.sum(loss(r))) / judged
+    begun = cost = float(np.sum(loss(r))) / judged
     if not len(theta):
-        return Descent(theta, cost, np.zeros((0, 0)), 0)
+        return Descent(theta, begun, cost, np.zeros((0, 0)), 0)
     damping, small, sweep, secants = 1e-3, 0, 1, 0
     J = slopes(theta, r)
     while True:
@@ -164,7 +165,7 @@ def descend(
                 continue
             theta, r, cost = tried.theta, tried.r, tried.cost
         if small == 2 or (not tried.moved and not secants) or sweep >= sweeps:
-            return Descent(theta, cost, normal, sweep)
+            return Descent(theta, begun, cost, normal, sweep)
         J, secants, sweep = slopes(theta, r), 0, sweep + 1
 
 

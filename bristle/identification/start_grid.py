@@ -8,6 +8,7 @@ from functools import cached_property
 from itertools import product
 from operator import is_
 from threading import Lock
+from typing import NamedTuple
 
 import numpy as np
 
@@ -263,26 +264,44 @@ def _thinned_out(problem: Problem, expected: Expected, kind: str) -> tuple[Probl
 class Candidate:
     """A candidate on its way, with its mean loss on the runs looked at.
 
-    `moves` whether any of its effect's parameters changes the force there: else no search leads on.
+    `moves` whether any of its effect's parameters changes the force there: else no search leads on;
+    `settled` whether a search has ended there.
     """
 
     model: Model
     cost: float
     moves: bool = True
+    settled: bool = False
 
 
-def scored_guesses(effect: str, context: SearchContext) -> tuple[float, list[Model]]:
-    """Return what an effect promises at its best start, and its starts, the best first.
+class Scored(NamedTuple):
+    """An effect's starts, the best first, and what it promises at the best: its `score`.
 
-    See `ScreeningData.score` and `promise`.
+    `here`, `slopes` are the residuals (n,) at the best start, and how they change with the effect's
+    own parameters (n, p).
     """
+
+    score: float
+    starts: list[Model]
+    here: Array
+    slopes: Array
+
+
+def scored_guesses(effect: str, context: SearchContext) -> Scored:
+    """Return an effect's starts with their score; see `ScreeningData.score` and `promise`."""
     screening = context.screening(effect)
     guesses = initial_guesses(effect, context.base, context.train)
     if len(guesses) > 1:
         guesses.sort(key=screening.promise, reverse=True)
-    own = _own_search(effect, guesses[0], screening)
+    here, slopes = _beside(effect, guesses[0], screening)
+    return Scored(screening.score(here, slopes), guesses, here, slopes)
+
+
+def _beside(effect: str, start: Model, screening: ScreeningData) -> tuple[Array, Array]:
+    """Return the residuals (n,) at a start, and how an effect's own parameters change them."""
+    own = _own_search(effect, start, screening)
     here = own.residuals(own.start)
-    return screening.score(here, own.jacobian(own.start, here)), guesses
+    return here, own.jacobian(own.start, here)
 
 
 def _own_search(effect: str, start: Model, screening: ScreeningData) -> Search:
@@ -292,7 +311,7 @@ def _own_search(effect: str, start: Model, screening: ScreeningData) -> Search:
 
 
 def ranked_guesses(
-    effect: str, context: SearchContext, starts: Sequence[Model] | None = None
+    effect: str, context: SearchContext, scored: Scored | None = None, most: int | None = None
 ) -> list[Candidate]:
     """Return an effect's starts after one linear step of all parameters, the best first.
 
@@ -302,43 +321,53 @@ def ranked_guesses(
     Parameters
     ----------
     effect, context : the effect, and what it is to join
-    starts : the best first; None for all
+    scored : its starts, None where they are not scored yet
+    most : how many of them are looked at; None for as many as the model allows
     """
     screening = context.screening(effect)
-    starts = scored_guesses(effect, context)[1] if starts is None else starts
-    found = [_stepped(start, effect, screening) for start in starts[: screening.looked]]
+    _, starts, *first = scored or scored_guesses(effect, context)
+    found = [_stepped(starts[0], effect, screening, *first)]
+    for start in starts[1 : most or screening.looked]:
+        found.append(_stepped(start, effect, screening, *_beside(effect, start, screening)))
     moving = [one for one in found if one.moves]
     return sorted(moving or found, key=lambda one: one.cost)
 
 
-def _stepped(start: Model, effect: str, screening: ScreeningData) -> Candidate:
+def _stepped(
+    start: Model, effect: str, screening: ScreeningData, here: Array, slopes: Array
+) -> Candidate:
     """Return a start, or what a linear step from it leads to where that is better.
 
     The base model's own sensitivities are taken as they are without the effect.
+
+    Parameters
+    ----------
+    start, effect, screening : where to step from, the effect that joins, and on which data
+    here, slopes : as `_beside` returns them
     """
-    own = _own_search(effect, start, screening)
-    added, base = own.names, [name for name in start.free() if name not in own.names]
-    here = own.residuals(own.start)
-    slopes = own.jacobian(own.start, here)
+    added = _own_search(effect, start, screening).names
+    base = [name for name in start.free() if name not in added]
     moves = not added or bool(slopes.any())
     step = linear_step(np.hstack([screening.known, slopes]), here)
     whole = Search(screening.problem, start, screening.expected, [*base, *added])
     best = Candidate(start, mean_loss(loss(here)), moves)
     for share in STEPS:
         theta = np.clip(whole.start - share * step, whole.low, whole.high)
-        cost = mean_loss(loss(whole.residuals(theta)))
+        there = whole.residuals(theta)
+        cost = mean_loss(loss(there))
         if cost < best.cost:
-            there = whole.at(theta)
-            if not moves or _moves(there, effect, screening):
-                return Candidate(there, cost, moves)
+            model = whole.at(theta)
+            if not moves or _moves(model, there, effect, screening):
+                return Candidate(model, cost, moves)
     return best
 
 
-def _moves(model: Model, effect: str, screening: ScreeningData) -> bool:
-    """Return whether an effect has a force at its values, or a parameter that gives it one."""
-    problem, expected = screening.problem, screening.expected
+def _moves(model: Model, here: Array, effect: str, screening: ScreeningData) -> bool:
+    """Return whether an effect has a force at its values, or a parameter that gives it one.
+
+    `here` (n,) are the model's residuals.
+    """
     without = replace(model, effects=tuple(one for one in model.effects if one != effect))
-    with_it, bare = (residuals(problem, one, expected) for one in (model, without))
-    if not np.array_equal(with_it, bare):
+    if not np.array_equal(here, residuals(screening.problem, without, screening.expected)):
         return True
     return bool(_own_search(effect, model, screening).sensitivities().any())

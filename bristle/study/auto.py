@@ -120,7 +120,9 @@ def complete(
     free = _begun_free(study, law_or_all(study, law), stepped)
     begun, took, anew, opened = left(), 0.0, False, None
     while True:
-        found = diagnose_study(study, law=ALL if free else study.model().law)
+        model = study.model()
+        adds = MOST_EFFECTS - len(model.effects)
+        found = diagnose_study(study, law=ALL if free else model.law, adds=adds)
         keeps(_kept(steps))
         took = took or begun - left()
         if free:

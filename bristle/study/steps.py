@@ -57,7 +57,9 @@ from .study import Note, Study, note, noted
 from .study_file import ALL, TEST
 
 
-def diagnose_study(study: Study, *, law: str | None = None, write: bool = True) -> Diagnosis:
+def diagnose_study(
+    study: Study, *, law: str | None = None, write: bool = True, adds: int = 0
+) -> Diagnosis:
     """Return what the present model of a study is missing; write verdict.json.
 
     A closure is no effect of physics: what it carries is missing still, so the verdict is on the
@@ -69,6 +71,7 @@ def diagnose_study(study: Study, *, law: str | None = None, write: bool = True) 
     law : "all" seeks the law together with its effects, the model's own keeps it; None seeks it
         where nobody chose one (`laws.law_or_all`)
     write : whether to write verdict.json
+    adds : how many effects that the verdict names are added at once: it is told without limits
 
     Raises
     ------
@@ -97,7 +100,7 @@ def diagnose_study(study: Study, *, law: str | None = None, write: bool = True) 
     found = diagnose_rig(
         runs.train, runs.holdout, physics, building_of(study, model), any_law=law == ALL,
         identified=identified and not networks, named=model.law,
-        kept=LawFits(study, physics) if write and law == ALL else None,
+        kept=LawFits(study, physics) if write and law == ALL else None, adds=adds,
     )  # fmt: skip
     if identified:
         rig = rig_of(study, model, runs)

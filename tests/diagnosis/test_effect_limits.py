@@ -42,6 +42,14 @@ def test_the_limit_of_a_linear_effect_is_that_of_a_fit_with_it(known):
     assert (limit.parameter, limit.unit, limit.falls, limit.coarse) == ("k", "N/m", False, False)
 
 
+@pytest.mark.parametrize("name", [SPRING, "quadratic_damping", "saturation", "stribeck"])
+def test_a_change_in_proportion_is_not_simulated_again_and_another_one_is(known, name):
+    sized = Sized(name, known)
+    for size in (1.0, 0.01, 0.3, 0.1):
+        alone = Sized(name, known).change(size)
+        assert np.allclose(sized.change(size), alone, rtol=0.0, atol=2e-6 * np.abs(alone).max())
+
+
 def test_a_limit_on_the_command_has_the_unit_of_the_runs(known):
     runs = [replace(run, drive="current") for run in known.problem.runs]
     driven = SizeSearch(known.problem.of(runs), known.model, known.expected, 6000)

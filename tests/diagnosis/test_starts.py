@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -17,6 +19,7 @@ from bristle.model.model import Model
 from bristle.physics.effect import EFFECTS
 
 DT, RATE = 0.002, 500.0
+SPRING = "gas_spring"
 LAW = {"f_c": 1.3, "f_v": 0.83, "c_0": 40.0, "c_v": 15.0, "v_n": 0.05, "exponent": 1.0}
 
 
@@ -86,6 +89,21 @@ def test_a_short_search_ends_where_a_long_one_does(springy):
     assert guesses.cost < 0.3 * springy.cost
     assert fitted.value("gas_spring.k") == pytest.approx(200.0, rel=0.05)
     assert fitted.value("gas_spring.preload") == pytest.approx(0.4, rel=0.1)
+
+
+def test_a_search_that_has_ended_is_not_begun_again(springy):
+    first, *_ = trials.guesses_of([SPRING], springy)[SPRING]
+    assert first.settled
+    assert short_search(SPRING, springy, [first]).model is first.model
+
+
+def test_the_noise_of_a_model_is_drawn_once(springy, monkeypatch):
+    train = springy.train
+    drawn = train.expectation(springy.base)
+    monkeypatch.delattr(Problem, "predict")
+    assert train.expectation(replace(springy.base)) is drawn
+    with pytest.raises(AttributeError):
+        train.expectation(springy.base, 4)
 
 
 @pytest.mark.parametrize("effect", joinable(Model("bingham")))
