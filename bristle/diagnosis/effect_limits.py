@@ -208,9 +208,17 @@ def untestable(
 
 
 def _change(name: str, model: Model, problem: Problem, expected: Expected, base: Array) -> Array:
-    """Return by how much an effect changes the normalised residuals (n,), at most of its starts."""
+    """Return by how much an effect changes the normalised residuals (n,), at most of its starts.
+
+    Of those that differ in its amount alone the largest one is looked at.
+    """
+    amount = EFFECTS[name].amount
+    key, sign = f"{name}.{amount.removeprefix('1/')}", -1.0 if amount.startswith("1/") else 1.0
+    starts = initial_guesses(name, model, problem)
+    starts.sort(key=lambda start: sign * abs(start.values.get(key, 0.0)))
+    apart = {tuple(sorted({**start.values, key: 0.0}.items())): start for start in starts}
     found = []
-    for start in initial_guesses(name, model, problem):
+    for start in apart.values():
         with_it = Search(problem, start, expected, [])
         found.append(with_it.residuals(with_it.start) - base)
     return max(found, key=rms)
