@@ -293,12 +293,12 @@ def left() -> float:
 
 
 @contextmanager
-def counted(most: float = inf) -> Iterator[Effort]:
+def counted(most: float = inf, least: float = -inf) -> Iterator[Effort]:
     """Count the steps of all dampers' forces in this context, and in threads begun in it.
 
-    Within another count no more may be spent than what that has left.
+    Within another count no more may be spent than what that has left, and always `least`.
     """
-    effort, outer = Effort(min(most, left())), _effort.get()
+    effort, outer = Effort(max(least, min(most, left()))), _effort.get()
     token = _effort.set(effort)
     try:
         yield effort

@@ -33,8 +33,9 @@ FOLDS = 3
 TRIED = 3
 """Laws, then effects, those that fit the training runs best, that folds compare at each step."""
 
-MOST_SPENT = 150e6
-"""Steps of dampers' forces, see `Effort`, from which on nothing further is compared."""
+MOST_SPENT = 200e6
+"""Steps of dampers' forces, see `Effort`, from which on nothing further is compared. They are there
+however long the verdict took: one that is unknown leaves the user nothing else."""
 
 TOGETHER = 2
 """Dependences on labels that another law is compared with at once, at most."""
@@ -61,7 +62,7 @@ class Unproven:
     cut: bool = False
 
 
-@counted(MOST_SPENT)
+@counted(MOST_SPENT, MOST_SPENT)
 def unproven(
     prepared: Prepared,
     trials: Sequence[Trial],
