@@ -579,7 +579,7 @@ def story_view(study: Study, verdict: Mapping[str, Any]) -> View:
     """
     model = study.model(to_show=True)
     gains = verdict.get("gains") or []
-    new = [row for row in gains if not set(row["effects"]) <= set(model.effects)]
+    new = [row for row in gains if not set(row["effects"]) & set(model.effects)]
     doubtful = [one for one in study.steps() if one.why.endswith(NOT_PROVEN)]
     # Beside another model than the verdict's its effects are not advised.
     other = verdict.get("law", model.law) not in (model.law, split_form(model.law)[0])
