@@ -67,7 +67,7 @@ class Remanence(Effect):
         ),
         "hold": Parameter(0.0, "1", (0.0, 0.95), "share of that way on which the branch is kept"),
     }
-    start_grid = {"width": (0.3, 1.0), "turn": (0.1, 1.0, 4.0), "hold": (0.0, 0.8)}
+    start_grid = {"width": (0.3, 1.0), "turn": (0.1, 1.0, 4.0)}
     mimics = ("late_drive", "limited_drive")
 
     @staticmethod
