@@ -18,7 +18,7 @@ from bristle.learning.fit import begun
 from bristle.learning.signals import ALONG, SLIP, slips
 from bristle.physics.effect import EFFECTS, Q
 from bristle.user_code.conformance import examine
-from bristle.user_code.load import defined
+from bristle.user_code.load import defined, flaw_of
 from bristle.user_code.trial import probe
 
 STEP = 0.002  # s
@@ -120,8 +120,13 @@ def test_a_formula_is_its_form_of_the_signal(along):
     assert found[moving] == pytest.approx(np.asarray(best.at(s))[moving], abs=0.003)
 
 
-# Each is examined for 2 to 4 s: that of a formula passes through the same file as that of a curve.
-@pytest.mark.parametrize("closed", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_its_file_is_an_effect_that_is_accepted():
+    text = effect_text("learned_9", curve_of("fluid", "displacement", 0.5), "made for a test, 2026")
+    assert flaw_of("learned_9", text) == ""
+
+
+@pytest.mark.slow  # 5 s each: with every law; by default its file is accepted as a user's own
+@pytest.mark.parametrize("closed", [False, True])
 def test_a_learned_effect_conforms_as_any_other(closed):
     curve = curve_of("fluid", "displacement", 0.5)
     formula = None
