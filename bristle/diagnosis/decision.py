@@ -263,7 +263,16 @@ def _effect_or_ambiguous(
 def named(
     names: Sequence[str], best: Trial, explained: float, reasons: Sequence[str], rule: DecisionRule
 ) -> Decision:
-    """Return the decision for the first of some effects, the others being its rivals."""
+    """Return the decision for the first of some effects, the others being its rivals.
+
+    Parameters
+    ----------
+    names : the effects
+    best : the trial of the first
+    explained : what it explains of the excess [1]
+    reasons : what the verdict says besides
+    rule : how many alternatives a decision names
+    """
     kind = "ambiguous" if len(names) > 1 else "effect"
     return Decision(kind, (*names[: rule.most_alternatives],), best, explained, (*reasons,))
 

@@ -349,7 +349,15 @@ def _motion(run: Run, fine: int) -> Signal:
 
 
 def start_values(damper: Model, fed: Fed, run: Run, problem: Problem) -> dict[str, float]:
-    """Return the parameters that a run sets: states that begin with a signal, labels, its load."""
+    """Return the parameters that a run sets: states that begin with a signal, labels, its load.
+
+    Parameters
+    ----------
+    damper : Model
+    fed : what its force function is fed in the run
+    run : that it is played in
+    problem : tells the load that it carries
+    """
     drive = drive_named(run.drive)
     moments = fed.moments
     first = {name: float(getattr(moments, name)[0]) for name in ("x", "v", "a", "V")}
