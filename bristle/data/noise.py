@@ -198,10 +198,11 @@ def _in_bands(y: Array, std: float, block: int) -> tuple[float, str]:
     """Return the standard deviation and the colour that the bands tell.
 
     The highest three neighbouring bands of one level are the noise; what rises below is signal.
+    Frequent jumps, too, give lower bands one level: beside them only the highest three are noise.
     """
     levels = [_level(y, kernel, block) for kernel in _BANDS]
     wide = _FLAT * (1.0 + 3.0 / sqrt(len(y)))  # levels scatter on short channels
-    for first in range(len(levels) - 2):
+    for first in range(len(levels) - 2 if block == _BLOCKS[0] else 1):
         three = levels[first : first + 3]
         if max(three) <= wide * min(three):
             below = levels[first + 1 : 5]  # a signal only adds to these
