@@ -239,6 +239,9 @@ LEAST_ZERO = 0.03
 SAME_ZERO = 0.15
 """Share of it by which a constant part may differ between runs and be that of the load cell."""
 
+SURE_ZERO = 4.0
+"""Standard deviations of a constant part that it is beyond, or within which it is the same."""
+
 
 def zero_of_load_cell(runs: Sequence[Measurement]) -> float | None:
     """Return the constant force [N] that runs show alike however they move, None without one.
@@ -251,7 +254,7 @@ def zero_of_load_cell(runs: Sequence[Measurement]) -> float | None:
         if velocity is None or "force" not in run.channels:
             return None
         counts = np.isfinite(run["force"]) & np.isfinite(velocity)
-        if not np.any(velocity[counts]):
+        if not counts.any() or np.ptp(velocity[counts]) == 0.0:
             return None
         drive = next((run[one][counts] for one in DRIVE if one in run.channels), None)
         found.append(force_offset(run["force"][counts], velocity[counts], drive))
@@ -260,8 +263,8 @@ def zero_of_load_cell(runs: Sequence[Measurement]) -> float | None:
     offsets, spreads = np.array(found).T
     zero = float(np.median(offsets))
     rms = float(np.sqrt(np.mean([np.nanvar(run["force"]) for run in runs])))
-    alike = np.abs(offsets - zero) <= np.maximum(SAME_ZERO * abs(zero), 4.0 * spreads)
-    sure = abs(zero) > max(LEAST_ZERO * rms, 4.0 * float(np.median(spreads)))
+    alike = np.abs(offsets - zero) <= np.maximum(SAME_ZERO * abs(zero), SURE_ZERO * spreads)
+    sure = abs(zero) > max(LEAST_ZERO * rms, SURE_ZERO * float(np.median(spreads)))
     return zero if sure and bool(alike.all()) else None
 
 
